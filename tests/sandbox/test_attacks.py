@@ -94,10 +94,32 @@ def test_the_suite_fails_without_a_layer(layer: str) -> None:
 @needs_boxes
 def test_what_no_cgroup_enforces_other_layers_do() -> None:
     bare = available_layers().without(MEMORY, PROCESSES, CLOCK)
-    names = ("memory", "memory of many", "processes", "threads", "processor time")
+    names = ("memory", "processes", "threads", "processor time")
     attacks = [each for each in ATTACKS if each.name.startswith(names)]
-    assert len(attacks) >= 8
+    assert len(attacks) >= 13
     assert [found.attack.name for found in strikes(bare, attacks) if not found.stopped] == []
+
+
+HONEST = """
+import asyncio, fcntl, multiprocessing
+async def wait():
+    await asyncio.sleep(0)
+    return (await asyncio.create_subprocess_exec('true')).pid
+here, there = multiprocessing.Pipe()
+here.send('a message'); said = there.recv()
+fcntl.fcntl(0, fcntl.F_SETFD, fcntl.FD_CLOEXEC)
+got = [asyncio.run(wait()) > 0, said, subprocess.run(['true']).returncode]
+"""
+
+
+@needs_boxes
+def test_what_no_cgroup_counts_honest_programs_may_use() -> None:
+    """Pipes and pairs of sockets are counted, not forbidden: loops of asyncio begin with some."""
+    bare = available_layers().without(MEMORY, PROCESSES, CLOCK)
+    with Baits() as baits:
+        found = strike(Attack("honest", (), HONEST), bare, baits)
+    assert not found.stopped, found.words
+    assert found.words == "[True, 'a message', 0]"
 
 
 def test_a_machine_that_can_not_hold_a_program_refuses_it(

@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.settings import Quota
 from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.hiding import NOTHING
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.submissions import RefusedError, Upload
 from dubins_traffic.service.tables import Account, Chunk, Phase, Submission, Trial
@@ -67,7 +68,14 @@ def taken(session: Session, at: float = NOW) -> Chunk:
 
 
 def results(numbers: list[int], frames: str = "f") -> list[dict[str, object]]:
-    same = {"row": {"end": "duration"}, "end": "duration", "owner": None, "log": "", "replay": None}
+    same = {
+        "row": {"end": "duration"},
+        "end": "duration",
+        "owner": None,
+        "log": "",
+        "replay": None,
+        "own_replay": None,
+    }
     return [{"number": number, "frames": frames, **same} for number in numbers]
 
 
@@ -76,7 +84,7 @@ def test_what_was_cancelled_while_it_ran_does_not_run_again_for_the_same_price(o
     with office.database.writing() as session:
         submission = handed(session, office, ann, "x")
         checked(session, submission)
-        submissions.record(session, taken(session), results(list(range(10))), NOW)
+        submissions.record(session, taken(session), results(list(range(10))), NOW, NOTHING)
         submissions.cancel(session, submission, NOW)
         again = handed(session, office, ann, "x")
         assert (again.id, again.state, again.costs, again.run) == (submission.id, "cancelled", True, 0)
@@ -87,7 +95,7 @@ def test_what_ran_and_is_judged_again_is_not_free_when_it_is_cancelled(office: O
     with office.database.writing() as session:
         submission = handed(session, office, ann, "x")
         checked(session, submission)
-        submissions.record(session, taken(session), results(list(range(10))), NOW)
+        submissions.record(session, taken(session), results(list(range(10))), NOW, NOTHING)
         submissions.judge_again(session, submission, range(12), NOW)
         assert submission.state == "queued"
         submissions.cancel(session, submission, NOW)
@@ -158,7 +166,7 @@ def test_a_slow_submission_that_goes_on_does_not_fail_by_our_fault(office: Offic
         late = NOW + submissions.DEADLINES["queued"] - 1.0
         chunk = taken(session, late)
         later = late + submissions.DEADLINES["running"] - 1.0
-        submissions.record(session, chunk, results(chunk.numbers), later)
+        submissions.record(session, chunk, results(chunk.numbers), later, NOTHING)
         housekeeping.end_overdue(session, later + 2.0)
         assert submission.state == "running"
         housekeeping.end_overdue(session, later + submissions.DEADLINES["running"] + 1.0)
@@ -172,14 +180,14 @@ def test_a_chunk_that_takes_long_is_reported_in_parts_and_others_come_between(of
         checked(session, slow)
         chunk = taken(session)
         other = handed(session, office, bob, "other")
-        submissions.record(session, chunk, results([0, 1]), NOW)
+        submissions.record(session, chunk, results([0, 1]), NOW, NOTHING)
         assert taken(session).submission_id == other.id
         while (next_one := queue.take(session, "w", NOW, 60.0)) is not None:
-            submissions.record(session, next_one, results(next_one.numbers), NOW)
-        assert [trial.number for trial in submissions.trials(session, slow)] == list(range(12))
+            submissions.record(session, next_one, results(next_one.numbers), NOW, NOTHING)
+        assert [trial.number for trial in submissions.trials(session, slow, NOTHING)] == list(range(12))
         assert slow.state == "scoring"
         with pytest.raises(RefusedError, match="other trials"):
-            submissions.record(session, chunk, [], NOW)
+            submissions.record(session, chunk, [], NOW, NOTHING)
 
 
 def test_the_sample_is_compared_whatever_ends_first(office: Office) -> None:
@@ -191,11 +199,11 @@ def test_the_sample_is_compared_whatever_ends_first(office: Office) -> None:
         leased = [taken(session), taken(session)]
         assert queue.take(session, "w", NOW, 60.0) is None
         for chunk in reversed(leased):
-            submissions.record(session, chunk, results(chunk.numbers), NOW)
+            submissions.record(session, chunk, results(chunk.numbers), NOW, NOTHING)
         again = taken(session)
         assert again.kind == "again"
-        submissions.record(session, again, results(again.numbers, "g"), NOW)
-        assert viewing.differing(session, submission) == again.numbers
+        submissions.record(session, again, results(again.numbers, "g"), NOW, NOTHING)
+        assert viewing.differing(office, session, submission) == again.numbers
 
 
 def test_nobody_knows_which_trials_run_twice() -> None:

@@ -15,6 +15,7 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.settings import Quota
 from dubins_traffic.service import accounts, housekeeping, queue, submissions
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.hiding import NOTHING
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.submissions import RefusedError, Upload
 from dubins_traffic.service.tables import Account, Act, Chunk, Competition, Phase, Submission, Trial
@@ -83,6 +84,7 @@ def results(chunk: Chunk, frames: str = "f") -> list[dict[str, object]]:
             "log": "",
             "frames": frames,
             "replay": None,
+            "own_replay": None,
         }
         for n in chunk.numbers
     ]
@@ -224,7 +226,7 @@ def test_state_and_queue_commit_together_or_not_at_all(database: Database) -> No
     def cut_off() -> None:
         with database.writing() as session:
             held = queue.held(session, chunk_id, token)
-            submissions.record(session, held, results(held), 40.0)
+            submissions.record(session, held, results(held), 40.0, NOTHING)
             raise RuntimeError("the plug was pulled")
 
     with pytest.raises(RuntimeError, match="pulled"):
@@ -236,7 +238,9 @@ def test_state_and_queue_commit_together_or_not_at_all(database: Database) -> No
         with database.writing() as session:
             held = session.get_one(Chunk, chunk_id)
             if held.state == "leased":
-                submissions.record(session, queue.held(session, chunk_id, token), results(held), 40.0)
+                submissions.record(
+                    session, queue.held(session, chunk_id, token), results(held), 40.0, NOTHING
+                )
             else:
                 with pytest.raises(queue.StaleLeaseError):
                     queue.held(session, chunk_id, token)
@@ -253,9 +257,11 @@ def test_a_sample_is_run_twice_and_frames_are_compared(database: Database) -> No
         frames = iter("fgh")
         while (chunk := queue.take(session, "w", 30.0, 60.0)) is not None:
             own = "other" if chunk.kind == "again" else next(frames, "f")
-            submissions.record(session, chunk, results(chunk, own), 40.0)
+            submissions.record(session, chunk, results(chunk, own), 40.0, NOTHING)
         assert submission.state == "scoring"
-        twice = [trial for trial in submissions.trials(session, submission) if trial.again is not None]
+        twice = [
+            trial for trial in submissions.trials(session, submission, NOTHING) if trial.again is not None
+        ]
         assert len(twice) == 2
         assert all(trial.again == "other" for trial in twice)
 
@@ -267,7 +273,7 @@ def test_results_of_other_trials_are_refused(database: Database) -> None:
         chunk = queue.take(session, "w", 30.0, 60.0)
         assert chunk is not None
         with pytest.raises(RefusedError, match="other trials"):
-            submissions.record(session, chunk, results(chunk)[1:], 40.0)
+            submissions.record(session, chunk, results(chunk)[1:], 40.0, NOTHING)
 
 
 def test_what_is_received_before_the_closing_second_counts(database: Database) -> None:

@@ -18,7 +18,7 @@ NOW = 5000.0
 
 @pytest.fixture
 def office(tmp_path: Path) -> Iterator[Office]:
-    made = Office(tmp_path / "here", clock=lambda: NOW)
+    made = Office(tmp_path / "here", tmp_path / "here.key", clock=lambda: NOW)
     made.database.migrate()
     yield made
     made.close()
@@ -89,4 +89,4 @@ def test_trials_that_differ_are_named(office: Office) -> None:
         first, second = session.scalars(select(Trial).order_by(Trial.number)).all()
         first.again, second.again = "f", "g"
         session.flush()
-        assert viewing.differing(session, made) == [1]
+        assert viewing.differing(office, session, made) == [1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,6 +18,8 @@ from dubins_traffic.competition.submission import Submission
 from dubins_traffic.errors import DubinsTrafficError, InputError, MissingExtraError
 from dubins_traffic.problem.faults import Strict, fault, parse
 from dubins_traffic.protocols import End
+from dubins_traffic.record import header
+from dubins_traffic.record.writer import RecordEncoder
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.sandbox import owner_of
 from dubins_traffic.scoring.columns import SECOND
@@ -49,8 +52,8 @@ class Judged:
         The tail of what the submission has printed.
     frames : str or None
         SHA-256 of all frames (`FramesHash`); None if it could not be run.
-    record : Path or None
-        Where the record is, if one is kept.
+    recorded : bytes or None
+        The record, if it was to be remembered.
     """
 
     number: int
@@ -59,7 +62,7 @@ class Judged:
     owner: Owner | None = None
     log: str = ""
     frames: str | None = None
-    record: Path | None = field(default=None, compare=False)
+    recorded: bytes | None = field(default=None, compare=False, repr=False)
 
     @property
     def counts(self) -> bool:
@@ -67,7 +70,7 @@ class Judged:
         return self.owner != "platform"
 
     def to_json(self) -> dict[str, Any]:
-        """Return it as a JSON object, without the record's place."""
+        """Return it as a JSON object, without the record."""
         return {
             "number": self.number,
             "row": dict(self.row),
@@ -118,6 +121,7 @@ def judge(
     seeds: Mapping[int, int] | None = None,
     trust: bool = False,
     records: Path | None = None,
+    remember: bool = False,
 ) -> Iterator[Judged]:
     """Run trials of a phase with a submission, one after the other, and yield what came of each.
 
@@ -137,6 +141,8 @@ def judge(
         Whether the submission may run with fewer limits than asked for, where this machine can't enforce them all.
     records : Path, optional
         A folder for records, ``trial-NUMBER.mcap``, made if missing.
+    remember : bool
+        Whether results have their records in memory; nothing of them is written then.
 
     Raises
     ------
@@ -149,11 +155,17 @@ def judge(
     for number in numbers:
         if number not in known:
             raise InputError("no seed for this trial", field=f"phases.{phase.name}", value=number)
-        yield _judged(phase, number, known[number], submission, trust=trust, records=records)
+        yield _judged(phase, number, known[number], submission, trust, records, remember)
 
 
 def _judged(
-    phase: Phase, number: int, seed: int, submission: Submission, *, trust: bool, records: Path | None
+    phase: Phase,
+    number: int,
+    seed: int,
+    submission: Submission,
+    trust: bool,
+    records: Path | None,
+    remember: bool,
 ) -> Judged:
     path = None if records is None else records / f"trial-{number:06d}.mcap"
     digest = FramesHash()
@@ -164,9 +176,11 @@ def _judged(
         return _failed(number, f"it can't be drawn: {error}")
     seat = boxed(submission, phase.limits, trust=trust)
     name = submission.digest[:12]
+    recorded = io.BytesIO()
+    memory = (RecordEncoder(recorded, header.encode(instance, name)),) if remember else ()
     try:
         result = run_trial(
-            instance, seat, record=path, overwrite=True, sinks=(digest,), sketch=False, name=name
+            instance, seat, record=path, overwrite=True, sinks=(digest, *memory), sketch=False, name=name
         )
     except (InputError, MissingExtraError):
         raise
@@ -175,7 +189,9 @@ def _judged(
     row = rows.row(number, result.ending, result.score, {})
     end = result.ending.end.value
     own = {name: _plain(row[name]) for name in rows.RESULT}
-    return Judged(number, own, end, OWNERS.get(end), seat.log_tail, digest.result(), path)
+    return Judged(
+        number, own, end, OWNERS.get(end), seat.log_tail, digest.result(), recorded.getvalue() or None
+    )
 
 
 def _failed(number: int, reason: str) -> Judged:

@@ -129,7 +129,7 @@ def seal(phase: Seeded, key: bytes, seeds: Seeds | None = None, *, overwrite: bo
     check_belong(seeds, phase)
     salt, nonce = secrets.token_bytes(16), secrets.token_bytes(12)
     head = {"version": 1, "phase": phase.name, "commitment": seeds.commitment}
-    hidden = _cipher(key, salt).encrypt(nonce, seeds.text.encode(), _bound(head))
+    hidden = cipher_of(key, salt).encrypt(nonce, seeds.text.encode(), _bound(head))
     texts = {name: _text(own) for name, own in (("salt", salt), ("nonce", nonce), ("sealed", hidden))}
     _write(path, dumps(Sealed.model_validate({**head, **texts}).model_dump()))
     return seeds.commitment
@@ -148,7 +148,7 @@ def unsealed(phase: Seeded, key: bytes) -> Seeds:
     path = sealed_path(phase)
     found = _sealed(phase)
     head = {"version": 1, "phase": found.phase, "commitment": found.commitment}
-    cipher = _cipher(key, _bytes(found.salt, path))
+    cipher = cipher_of(key, _bytes(found.salt, path))
     nonce, hidden = _bytes(found.nonce, path), _bytes(found.sealed, path)
     from cryptography.exceptions import InvalidTag
 
@@ -303,7 +303,8 @@ def _folder(phase: Seeded) -> Path:
     return phase.folder
 
 
-def _cipher(key: bytes, salt: bytes) -> Any:
+def cipher_of(key: bytes, salt: bytes) -> Any:
+    """Return the cipher (AESGCM) whose key scrypt derives from a passphrase or key; MissingExtraError without it."""
     try:
         from cryptography.hazmat.primitives.ciphers.aead import AESGCM
     except ImportError as error:

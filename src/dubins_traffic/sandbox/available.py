@@ -50,6 +50,10 @@ def held(layers: Layers) -> Iterator[tuple[str, str]]:
         "memory",
         f"{group}: memory" if MEMORY in layers else "RLIMIT_AS of each process, and their sum is watched",
     )
+    yield (
+        "buffers of pipes, sockets",
+        f"{group}: memory" if MEMORY in layers else "their number is watched" if SECCOMP in layers else "",
+    )
     yield "processes", f"{group}: pids, and RLIMIT_NPROC" if PROCESSES in layers else box and "RLIMIT_NPROC"
     yield "processor time", f"{group}: its clock" if CLOCK in layers else "the clocks of its processes"
     yield "wall clock, lines, output", "this process"

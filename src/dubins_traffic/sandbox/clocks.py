@@ -7,13 +7,18 @@ sees to (`seccomp.program`).
 
 from __future__ import annotations
 
+import contextlib
 import os
+from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 from time import clock_gettime, monotonic
 from typing import Final
 
 LOOK: Final = 0.02
 """Seconds between two looks at all processes."""
+PIPE: Final = 1 << 16
+"""Bytes that a pipe holds unless it is made larger."""
 _TICK: Final = 1.0 / os.sysconf("SC_CLK_TCK")
 _PAGE: Final = os.sysconf("SC_PAGE_SIZE")
 
@@ -33,8 +38,8 @@ class ProcessClocks:
         self._seconds = 0.0
         self.memory = 0
         """Bytes that the processes held in memory at the last look."""
-        self.processes = 0
-        """How many there were."""
+        self.processes: Sequence[int] = ()
+        """Which there were."""
 
     def seconds(self, *, now: bool = False) -> float:
         """Return the processor time so far, as of the last look, which is a few hundredths of a second ago at most."""
@@ -44,7 +49,7 @@ class ProcessClocks:
 
     def _look(self) -> None:
         self._looked = monotonic()
-        total, memory, seen = 0.0, 0, 0
+        total, memory, seen = 0.0, 0, list[int]()
         waiting = [self._first]
         while waiting:
             process = waiting.pop()
@@ -52,10 +57,29 @@ class ProcessClocks:
             if found is None:
                 continue
             seconds, pages = found
-            total, memory, seen = total + seconds, memory + pages * _PAGE, seen + 1
+            total, memory = total + seconds, memory + pages * _PAGE
+            seen.append(process)
             waiting += children(process)
         self._seconds = max(self._seconds, total)
         self.memory, self.processes = memory, seen
+
+    def buffers(self) -> int:
+        """Return how many bytes the kernel holds at most in the pipes and sockets of the processes of the last look."""
+        found: set[str] = set()
+        unseen = 0
+        for thread in (each for process in self.processes for each in _threads(process)):
+            try:
+                held = list((thread / "fd").iterdir())
+            except PermissionError:
+                unseen += _table(thread)
+                continue
+            except OSError:
+                continue
+            for each in held:
+                with contextlib.suppress(OSError):
+                    found.add(str(each.readlink()))
+        sockets = unseen + sum(name.startswith("socket:") for name in found)
+        return sockets * _socket() + sum(name.startswith("pipe:") for name in found) * PIPE
 
 
 def _stat(process: int) -> tuple[float, int] | None:
@@ -77,6 +101,34 @@ def _exact(process: int) -> float | None:
         return clock_gettime((~process << 3) | 2)
     except OSError:
         return None
+
+
+def _threads(process: int) -> list[Path]:
+    """Return the threads of a process; each may have descriptors of its own, and the first may have ended."""
+    try:
+        return list(Path(f"/proc/{process}/task").iterdir())
+    except OSError:
+        return []
+
+
+def _table(thread: Path) -> int:
+    """Return how many descriptors a thread has room for that does not show which it holds; 0 if it has ended."""
+    try:
+        lines = (thread / "status").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return 0
+    said = dict(line.split(":", 1) for line in lines if ":" in line)
+    return 0 if said["State"].split()[0] in ("Z", "X") else int(said.get("FDSize", "0"))
+
+
+@cache
+def _socket() -> int:
+    """Return how many bytes of memory a socket may hold: one message is taken while there is any room."""
+    try:
+        usual = int(Path("/proc/sys/net/core/wmem_default").read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        usual = 212992
+    return 2 * usual
 
 
 def children(process: int) -> list[int]:

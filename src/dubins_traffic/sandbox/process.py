@@ -71,7 +71,11 @@ class Processes:
     def _begin(self, program: Program) -> None:
         group = self._group
         self._timed = group if CLOCK in self._layers and group is not None and group.has_clock else None
-        rules = seccomp.program(counts_children=self._timed is None) if SECCOMP in self._layers else b""
+        rules = b""
+        if SECCOMP in self._layers:
+            rules = seccomp.program(
+                counts_children=self._timed is None, counts_buffers=MEMORY not in self._layers
+            )
         doors = () if group is None else group.doors
         with _piped(rules) as source:
             line = command_line(
@@ -104,7 +108,7 @@ class Processes:
         """Tell whether they have been stopped, or are to be stopped, for the memory that they use."""
         if self._group is not None and MEMORY in self._layers:
             return self._group.out_of_memory()
-        return self._clocks.memory > self._limits.memory
+        return self._clocks.memory + self._clocks.buffers() > self._limits.memory
 
     def files(self) -> int:
         """Return how many files the box has of its own, 0 where that can't be seen."""

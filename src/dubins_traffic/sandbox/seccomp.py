@@ -38,8 +38,13 @@ ALLOWED: Final = """
 
 NAMESPACES: Final = 0x7E020080
 """The flags of `clone` for new namespaces: time, mount, cgroup, uts, ipc, user, pid, net."""
+BUFFERS: Final = ("fcntl", "inotify_init", "inotify_init1", "sendmsg", "setsockopt")
+"""Calls by which the kernel can be made to hold more than is seen."""
+FCNTL: Final = (*range(6), *range(8, 15), *range(1024, 1031), 1032, 1034)
+"""What `fcntl` may be asked for then: neither for the size of a pipe nor for a lock."""
 AF_UNIX: Final = 1
 SIGCHLD: Final = 17
+SIGNALS: Final = 64
 UNKNOWN: Final = -1
 """What libseccomp says of a system call that it does not know."""
 IOCTL: Final = {
@@ -70,7 +75,7 @@ def binding() -> Any:
 
 
 @cache
-def program(*, counts_children: bool = False) -> bytes:
+def program(*, counts_children: bool = False, counts_buffers: bool = False) -> bytes:
     """Return the filter as the kernel reads it.
 
     Parameters
@@ -78,6 +83,10 @@ def program(*, counts_children: bool = False) -> bytes:
     counts_children : bool
         Whether processor time is counted by the clocks of processes: then a program can't have its children forgotten
         as soon as they end, by not caring for SIGCHLD, since their time would be forgotten with them.
+    counts_buffers : bool
+        Whether memory is counted by what processes hold, and what pipes and sockets may hold in the kernel with it:
+        then these keep the sizes that they begin with, each is held by a descriptor (`ProcessClocks.buffers`) and none
+        by a message alone, and there are no queues of notices and no locks of parts of files, which nobody could count.
 
     Raises
     ------
@@ -89,13 +98,21 @@ def program(*, counts_children: bool = False) -> bytes:
         raise InputError("can't be loaded", file="libseccomp", expected="libseccomp2 and pyseccomp")
     made = library.SyscallFilter(library.ERRNO(errno.EPERM))
     for name in ALLOWED.split():
-        _allow(library, made, name)
+        if not (counts_buffers and name in BUFFERS):
+            _allow(library, made, name)
+    if counts_buffers:
+        for number in FCNTL:
+            _allow(library, made, "fcntl", library.Arg(1, library.EQ, number))
     _allow(library, made, "clone", library.Arg(0, library.MASKED_EQ, NAMESPACES, 0))
     _allow(library, made, "socketpair", library.Arg(0, library.EQ, AF_UNIX))
     _allow(library, made, "personality", library.Arg(0, library.EQ, PERSONALITY_AS_IT_IS))
     for number in PRCTL.values():
         _allow(library, made, "prctl", library.Arg(0, library.EQ, number))
-    _allow(library, made, "rt_sigaction", *([library.Arg(0, library.NE, SIGCHLD)] if counts_children else []))
+    if counts_children:
+        for number in set(range(1, SIGNALS + 1)) - {SIGCHLD}:
+            _allow(library, made, "rt_sigaction", library.Arg(0, library.EQ, number))
+    else:
+        _allow(library, made, "rt_sigaction")
     for number in IOCTL.values():
         _allow(library, made, "ioctl", library.Arg(1, library.EQ, number))
     made.add_rule(library.ERRNO(errno.ENOSYS), "clone3")

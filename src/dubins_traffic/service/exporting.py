@@ -22,7 +22,7 @@ A competition of dubins-traffic, exported.
   published/                  commitments to secret seeds, and the seeds where they are revealed
   submissions/DIGEST          what teams have sent
   PHASE/submissions.json      all submissions of a phase, and which of them counted
-  PHASE/results-N.json        the results of submission N, a row a trial
+  PHASE/results-N.json        the results of submission N, a row a trial; why a controller failed is its team's alone
   PHASE/table.json            the places
 
 Run the entry on the first place again, and compare its rows:
@@ -62,14 +62,17 @@ def _entries(office: Office, session: Session, row: Competition) -> Iterator[tup
         if not phase.is_closed(office.clock()) and phase.shows != "all":
             continue
         found = receiving.submissions_of(session, phase, None)
-        yield from _of_phase(session, phase, found)
+        yield from _of_phase(office, session, phase, found)
         sent |= {one.digest for one in found}
     for digest in sorted(sent):
         yield f"submissions/{digest}", office.storage.get(digest, "submissions")
 
 
-def _of_phase(session: Session, phase: Phase, found: list[Submission]) -> Iterator[tuple[str, bytes]]:
-    latest = standings.latest_standing(session, phase)
+def _of_phase(
+    office: Office, session: Session, phase: Phase, found: list[Submission]
+) -> Iterator[tuple[str, bytes]]:
+    hiding = office.hiding(phase)
+    latest = standings.latest_standing(session, phase, hiding)
     counted = {own.id for own in standings.counting(session, phase).values()}
     yield f"{phase.name}/table.json", _json([] if latest is None else latest.places)
     described = [
@@ -80,7 +83,6 @@ def _of_phase(session: Session, phase: Phase, found: list[Submission]) -> Iterat
             "content": one.content,
             "received": viewing.iso(one.received),
             "state": one.state,
-            "reason": one.reason,
             "disqualified": one.disqualified,
             "counted": one.id in counted,
         }
@@ -88,7 +90,8 @@ def _of_phase(session: Session, phase: Phase, found: list[Submission]) -> Iterat
     ]
     yield f"{phase.name}/submissions.json", _json(described)
     for one in found:
-        rows = [{**own.row, "frames": own.frames} for own in submissions.trials(session, one)]
+        trials = submissions.trials(session, one, hiding)
+        rows = [{**viewing.shared(own.row), "frames": own.frames} for own in trials]
         yield f"{phase.name}/results-{one.id}.json", _json(rows)
 
 

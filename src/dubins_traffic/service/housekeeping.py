@@ -12,6 +12,7 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
 from dubins_traffic.service import organising, queue, standings, submissions
+from dubins_traffic.service.hiding import Hiding
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Phase, Submission
 
@@ -73,13 +74,14 @@ def check_podiums(office: Office) -> None:
                 select(Submission.id).where(Submission.phase_id == phase.id, active).limit(1)
             )
             if busy.first() is None and phase.ranked >= phase.version:
-                _run_podium_again(session, phase)
+                _run_podium_again(session, phase, office.hiding(phase))
 
 
-def _run_podium_again(session: Session, phase: Phase) -> None:
-    for number in standings.first_entries(session, phase, PODIUM):
+def _run_podium_again(session: Session, phase: Phase, hiding: Hiding) -> None:
+    for number in standings.first_entries(session, phase, PODIUM, hiding):
         submission = session.get_one(Submission, number)
-        left = [trial.number for trial in submissions.trials(session, submission) if trial.again is None]
+        found = submissions.trials(session, submission, hiding)
+        left = [trial.number for trial in found if trial.again is None]
         queue.add(session, submission, "again", submissions.in_chunks(left))
     phase.podium_checked = True
 

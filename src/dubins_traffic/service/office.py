@@ -15,7 +15,9 @@ from sqlalchemy.orm import Session, joinedload
 
 from dubins_traffic.competition import competition as files
 from dubins_traffic.competition import keys
+from dubins_traffic.errors import InputError
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.hiding import NOTHING, Hiding, hiding_of
 from dubins_traffic.service.settings import Settings, load_settings, own_secret
 from dubins_traffic.service.storage import Storage
 from dubins_traffic.service.tables import Competition, Phase
@@ -37,7 +39,7 @@ class Office:
     """
 
     def __init__(self, folder: Path, key_file: Path | None = None, clock: Clock = time.time) -> None:
-        folder.mkdir(parents=True, exist_ok=True)
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.folder = folder
         self.settings: Settings = load_settings(folder)
         self.clock = clock
@@ -47,11 +49,7 @@ class Office:
         self._key = None if key_file is None else _key(key_file, folder)
         self._competitions: dict[int, files.Competition] = {}
         self._seeds: dict[tuple[int, str], tuple[int, ...]] = {}
-
-    @property
-    def key(self) -> bytes | None:
-        """What unlocks secret seeds."""
-        return self._key
+        self._hidings: dict[int, Hiding] = {}
 
     def competition(self, row: Competition) -> files.Competition:
         """Return a competition as its file says it."""
@@ -79,6 +77,28 @@ class Office:
         if which not in self._seeds:
             self._seeds[which] = phase.seeds(self._key)
         return self._seeds[which]
+
+    def hiding(self, row: Phase) -> Hiding:
+        """Return what hides the results of a phase, all that is kept of them; of one that shows all, nothing is hidden.
+
+        Raises
+        ------
+        InputError
+            If there is no key.
+        """
+        if row.shows == "all":
+            return NOTHING
+        if row.id not in self._hidings:
+            self._hidings[row.id] = hiding_of(self.needed_key(), f"{row.competition.slug}/{row.name}")
+        return self._hidings[row.id]
+
+    def needed_key(self) -> bytes:
+        """Return what unlocks secret seeds; InputError if there is no key."""
+        if self._key is None:
+            raise InputError(
+                "no key for what is secret", file="--key-file", expected="a key file outside the folder"
+            )
+        return self._key
 
     def close(self) -> None:
         """Let go of the database."""

@@ -58,7 +58,7 @@ def create(office: Office, slug: str, given: Mapping[str, bytes], by: Account | 
         loaded = _written(Path(draft), given)
         for phase in loaded.phases:
             if phase.secret:
-                sealing.seal(phase, _needed(office))
+                sealing.seal(phase, office.needed_key())
         with office.database.writing() as session:
             if competition_of(session, slug) is not None:
                 raise WrongEntryError("address: taken")
@@ -115,14 +115,6 @@ def _named_files(draft: Path) -> list[str]:
         cast("Any", entry).get("file", "") if isinstance(entry, dict) else entry for entry in entries
     ]
     return [name for name in named if isinstance(name, str) and ("/" in name or "\\" in name)]
-
-
-def _needed(office: Office) -> bytes:
-    if office.key is None:
-        raise InputError(
-            "no key for secret seeds", file="--key-file", expected="a key file outside the folder"
-        )
-    return office.key
 
 
 def _rows(session: Session, slug: str, loaded: Loaded, at: float) -> Competition:
@@ -195,7 +187,7 @@ def reveal(office: Office, session: Session, phase: Phase, by: Account) -> None:
     if phase.revealed is not None:
         raise submissions.RefusedError("the seeds are revealed already")
     try:
-        sealing.reveal(office.phase(phase), _needed(office))
+        sealing.reveal(office.phase(phase), office.needed_key())
     except DubinsTrafficError as error:
         raise submissions.RefusedError(str(error)) from error
     phase.revealed = at

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
-from sqlalchemy import select
+from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.competition import Phase as Loaded
 from dubins_traffic.competition.judging import Judged
 from dubins_traffic.competition.ranking import missing, rank
 from dubins_traffic.service import submissions
+from dubins_traffic.service.hiding import Hiding
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Phase, Standing, Submission, Team, Trial
 
@@ -59,7 +60,8 @@ def _rank_phase(office: Office, number: int) -> None:
         ).all()
         silent = row.shows == "aggregates" and not row.is_closed(at) and not _may_answer(session, row, at)
         version = row.version
-        places = None if silent or version == row.ranked else table(session, row, office.phase(row))
+        hiding = office.hiding(row)
+        places = None if silent or version == row.ranked else table(session, row, office.phase(row), hiding)
     if silent and not waiting:
         return
     with office.database.writing() as session:
@@ -69,22 +71,24 @@ def _rank_phase(office: Office, number: int) -> None:
         row = session.get_one(Phase, number)
         if places is not None and row.version == version:
             row.ranked = version
-            latest = latest_standing(session, row)
+            latest = latest_standing(session, row, hiding)
             if latest is None or latest.places != places:
-                session.add(Standing(phase_id=row.id, at=at, version=version, places=places))
+                made = Standing(phase_id=row.id, at=at, version=version)
+                hiding.keep(made, {"places": places})
+                session.add(made)
 
 
 def _may_answer(session: Session, phase: Phase, at: float) -> bool:
-    latest = latest_standing(session, phase)
-    return latest is None or at - latest.at >= DAY / ANSWERS_A_DAY
+    at_last = session.scalar(select(func.max(Standing.at)).where(Standing.phase_id == phase.id))
+    return at_last is None or at - at_last >= DAY / ANSWERS_A_DAY
 
 
-def table(session: Session, row: Phase, phase: Loaded) -> list[dict[str, Any]]:
+def table(session: Session, row: Phase, phase: Loaded, hiding: Hiding) -> list[dict[str, Any]]:
     """Return the places of a phase as JSON objects, each with its team and submission; incomplete ones are left out."""
     entries: dict[str, list[Judged]] = {}
     whose: dict[str, Submission] = {}
     for team_id, submission in counting(session, row).items():
-        results = judged(submissions.trials(session, submission))
+        results = judged(submissions.trials(session, submission, hiding))
         if not missing(results, phase):
             name = session.get_one(Team, team_id).name
             entries[name], whose[name] = results, submission
@@ -94,20 +98,22 @@ def table(session: Session, row: Phase, phase: Loaded) -> list[dict[str, Any]]:
     ]
 
 
-def latest_standing(session: Session, phase: Phase) -> Standing | None:
+def latest_standing(session: Session, phase: Phase, hiding: Hiding) -> Standing | None:
     """Return the newest table of a phase, if there is one."""
     query = select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id.desc()).limit(1)
-    return session.scalars(query).first()
+    found = session.scalars(query).first()
+    return None if found is None else hiding.shown(found)
 
 
-def history(session: Session, phase: Phase) -> Sequence[Standing]:
+def history(session: Session, phase: Phase, hiding: Hiding) -> Sequence[Standing]:
     """Return all tables of a phase, oldest first."""
-    return session.scalars(select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id)).all()
+    query = select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id)
+    return [hiding.shown(one) for one in session.scalars(query)]
 
 
-def first_entries(session: Session, phase: Phase, count: int) -> list[int]:
+def first_entries(session: Session, phase: Phase, count: int, hiding: Hiding) -> list[int]:
     """Return the numbers of the submissions on the first places."""
-    latest = latest_standing(session, phase)
+    latest = latest_standing(session, phase, hiding)
     return (
         [] if latest is None else [place["submission"] for place in latest.places if place["place"] <= count]
     )

@@ -14,6 +14,7 @@ from sqlalchemy.orm import Session, defer, undefer
 from dubins_traffic.competition.settings import Quota
 from dubins_traffic.errors import DubinsTrafficError, shown
 from dubins_traffic.service import queue
+from dubins_traffic.service.hiding import Hiding
 from dubins_traffic.service.tables import Account, Chunk, Phase, Submission, Trial
 
 HOUR = 3600.0
@@ -217,7 +218,9 @@ def cancel(session: Session, submission: Submission, at: float) -> None:
     enter(submission, "cancelled", at, "cancelled by the team", THEIRS)
 
 
-def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at: float) -> None:
+def record(
+    session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at: float, hiding: Hiding
+) -> None:
     """Keep the results of the first trials of a chunk, end its lease, queue the rest, and let the submission go on.
 
     Parameters
@@ -227,9 +230,11 @@ def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at
     chunk : Chunk
         The chunk, on lease.
     results : sequence of dict
-        For each of its trials, or its first, `number`, `row`, `end`, `owner`, `log`, `frames` and `replay`.
+        For each of its trials, or its first, `number`, `row`, `end`, `owner`, `log`, `frames` and its replays.
     at : float
         Now.
+    hiding : Hiding
+        Of the phase.
 
     Raises
     ------
@@ -242,11 +247,16 @@ def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at
     submission = chunk.submission
     if chunk.kind == "again":
         hashes = {result["number"]: result["frames"] for result in results}
-        for trial in trials(session, submission):
-            trial.again = hashes.get(trial.number, trial.again)
+        for trial in _kept(session, submission):
+            if trial.number in hashes:
+                hiding.keep(trial, {"again": hashes[trial.number]})
     else:
         for result in results:
-            session.add(Trial(submission_id=submission.id, run=chunk.run, **result))
+            named = {name: result[name] for name in ("number", "replay", "own_replay")}
+            trial = Trial(submission_id=submission.id, run=chunk.run, **named)
+            told = {name: result[name] for name in ("row", "end", "owner", "frames")}
+            hiding.keep(trial, told, result["log"])
+            session.add(trial)
     chunk.numbers = numbers
     queue.finish(session, chunk)
     if left:
@@ -261,15 +271,22 @@ def _go_on(session: Session, submission: Submission, chunk: Chunk, at: float) ->
     if queue.unfinished(session, submission):
         return
     if chunk.kind == "trials":
-        numbers = [trial.number for trial in trials(session, submission)]
+        numbers = [trial.number for trial in _kept(session, submission)]
         queue.add(session, submission, "again", in_chunks(sample(numbers)))
         return
     enter(submission, "scoring", at)
     submission.phase.version += 1
 
 
-def trials(session: Session, submission: Submission, *, logs: bool = False) -> Sequence[Trial]:
+def trials(
+    session: Session, submission: Submission, hiding: Hiding, *, logs: bool = False
+) -> Sequence[Trial]:
     """Return the results of a submission's present run, in the order of their numbers; logs are read if asked for."""
+    return [hiding.shown(trial, logs=logs) for trial in _kept(session, submission, logs=logs)]
+
+
+def _kept(session: Session, submission: Submission, *, logs: bool = False) -> Sequence[Trial]:
+    """Return the results of a submission's present run as they are kept."""
     own = select(Trial).where(Trial.submission_id == submission.id, Trial.run == submission.run)
     read = undefer(Trial.log) if logs else defer(Trial.log, raiseload=True)
     return session.scalars(own.order_by(Trial.number).options(read)).all()

@@ -4,7 +4,18 @@ from __future__ import annotations
 
 from typing import Any
 
-from sqlalchemy import JSON, Boolean, Double, ForeignKey, Index, Integer, String, Text, UniqueConstraint
+from sqlalchemy import (
+    JSON,
+    Boolean,
+    Double,
+    ForeignKey,
+    Index,
+    Integer,
+    LargeBinary,
+    String,
+    Text,
+    UniqueConstraint,
+)
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column, relationship
 
 
@@ -160,32 +171,39 @@ class Chunk(Base):
 
 
 class Trial(Base):
-    """The result of a trial. `again` is the hash of its frames when it was run a second time."""
+    """The result of a trial. `again` is the hash of its frames when it was run a second time.
+
+    In a phase that does not show all `hidden` holds it encrypted, and `log` too is (`service.hiding`). `own_replay` is
+    a replay with the words of the controller, if it had any: its team sees that.
+    """
 
     __tablename__ = "trial"
     id: Mapped[int] = mapped_column(primary_key=True)
     submission_id: Mapped[int] = mapped_column(ForeignKey("submission.id"))
     run: Mapped[int]
     number: Mapped[int]
-    row: Mapped[dict[str, Any]]
-    end: Mapped[str] = mapped_column(String(40))
+    row: Mapped[dict[str, Any]] = mapped_column(default=dict)
+    end: Mapped[str] = mapped_column(String(40), default="")
     owner: Mapped[str | None] = mapped_column(String(20))
     log: Mapped[str] = mapped_column(Text)
     frames: Mapped[str | None] = mapped_column(String(64))
     again: Mapped[str | None] = mapped_column(String(64))
     replay: Mapped[str | None] = mapped_column(String(64))
+    own_replay: Mapped[str | None] = mapped_column(String(64))
+    hidden: Mapped[bytes | None] = mapped_column(LargeBinary)
     __table_args__ = (UniqueConstraint("submission_id", "run", "number"),)
 
 
 class Standing(Base):
-    """A table of places as it was at a time: the history of a leaderboard."""
+    """A table of places as it was at a time: the history of a leaderboard; `hidden` as that of a trial."""
 
     __tablename__ = "standing"
     id: Mapped[int] = mapped_column(primary_key=True)
     phase_id: Mapped[int] = mapped_column(ForeignKey("phase.id"), index=True)
     at: Mapped[float]
     version: Mapped[int]
-    places: Mapped[list[Any]]
+    places: Mapped[list[Any]] = mapped_column(default=list)
+    hidden: Mapped[bytes | None] = mapped_column(LargeBinary)
 
 
 class Act(Base):

@@ -49,6 +49,16 @@ def sees_trials(row: Phase, account: Account | None, submission: Submission, at:
     return owns(account, submission) or (row.is_closed(at) and submission.state == "done")
 
 
+def shared(row: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what others see of a result: how it ended and was scored, without words, which may quote a controller."""
+    return {**row, "reason": None}
+
+
+def replay_of(trial: Trial, submission: Submission, account: Account | None) -> str | None:
+    """Return which replay of a trial somebody may see: with the controller's words, if they own them."""
+    return (owns(account, submission) and trial.own_replay) or trial.replay
+
+
 def told_competition(office: Office, row: Competition) -> dict[str, Any]:
     """Return a competition for everybody."""
     at, loaded = office.clock(), office.competition(row)
@@ -98,7 +108,8 @@ def told_submission(
         iso(submission.received),
         place,
     )
-    results = standings.judged(submissions.trials(session, submission, logs=logs), logs=logs)
+    found = submissions.trials(session, submission, office.hiding(row), logs=logs)
+    results = standings.judged(found, logs=logs)
     now = datetime.fromtimestamp(office.clock(), UTC)
     phase = office.phase(row)
     if is_organiser(account):
@@ -122,18 +133,19 @@ def told_submission(
     }
 
 
-def differing(session: Session, submission: Submission) -> list[int]:
+def differing(office: Office, session: Session, submission: Submission) -> list[int]:
     """Return the trials whose frames were others when they were run a second time."""
-    own = submissions.trials(session, submission)
+    own = submissions.trials(session, submission, office.hiding(submission.phase))
     return [trial.number for trial in own if trial.again is not None and trial.again != trial.frames]
 
 
-def trial_of(session: Session, submission: Submission, number: int) -> Trial | None:
-    """Return the result of a trial of a submission's present run."""
+def trial_of(office: Office, session: Session, submission: Submission, number: int) -> Trial | None:
+    """Return the result of a trial of a submission's present run, its log with it."""
     query = select(Trial).where(
         Trial.submission_id == submission.id, Trial.run == submission.run, Trial.number == number
     )
-    return session.scalars(query).first()
+    found = session.scalars(query).first()
+    return None if found is None else office.hiding(submission.phase).shown(found, logs=True)
 
 
 def told_status(office: Office, session: Session) -> dict[str, Any]:

@@ -6,11 +6,11 @@ It knows nothing but an address and a token; seeds come with the work and are go
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import errno
 import gzip
 import os
 import signal
-import tempfile
 import threading
 import time
 from collections.abc import Callable, Generator
@@ -23,6 +23,7 @@ from dubins_traffic.competition.competition import Competition, Phase
 from dubins_traffic.competition.judging import Judged, judge
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.record.reader import Record, from_bytes
 from dubins_traffic.sandbox import available_layers
 from dubins_traffic.sandbox.submission import program_of
 from dubins_traffic.service.connection import AwayError, Connection, RefusalError
@@ -173,31 +174,38 @@ class Worker:
         numbers: list[int] = lease["numbers"]
         trials: list[dict[str, Any]] = []
         began = time.monotonic()
-        with tempfile.TemporaryDirectory(dir=self._folder) as drafts:
-            records = None if lease["kind"] == "again" else Path(drafts)
-            for judged in judge(phase, numbers, submission, seeds=seeds, trust=self._trust, records=records):
-                if not judged.counts:
-                    raise DubinsTrafficError(f"trial {judged.number}: {judged.end}: {judged.row['reason']}")
-                trials.append({**judged.to_json(), "replay": self._replay(judged, lease, lost)})
-                if lost.is_set():
-                    return None
-                if self._stopping.is_set() or time.monotonic() - began > LONGEST_S:
-                    break
+        again = lease["kind"] == "again"
+        for judged in judge(phase, numbers, submission, seeds=seeds, trust=self._trust, remember=not again):
+            if not judged.counts:
+                raise DubinsTrafficError(f"trial {judged.number}: {judged.end}: {judged.row['reason']}")
+            trials.append({**judged.to_json(), **self._replays(judged, lease, lost)})
+            if lost.is_set():
+                return None
+            if self._stopping.is_set() or time.monotonic() - began > LONGEST_S:
+                break
         return {"trials": trials}
 
     def _over(self, lost: threading.Event) -> Callable[[], bool]:
         """Return what tells that a lease is of no use any more."""
         return lambda: lost.is_set() or self._stopping.is_set()
 
-    def _replay(self, judged: Judged, lease: dict[str, Any], lost: threading.Event) -> str | None:
-        """Send the page that replays a trial, and return its SHA-256; None for a trial without a frame."""
-        if judged.record is None or not judged.record.exists():
-            return None
+    def _replays(self, judged: Judged, lease: dict[str, Any], lost: threading.Event) -> dict[str, str | None]:
+        """Send the pages that replay a trial, and return their SHA-256; None for a trial without a frame."""
+        sent: dict[str, str | None] = {"replay": None, "own_replay": None}
+        if judged.recorded is None:
+            return sent
         try:
-            page = replay_of(judged.record)
+            record = from_bytes(judged.recorded)
+            mute = without_words(record)
+            sent["replay"] = self._sent(judged.number, replay_of(mute), lease, lost)
+            if mute is not record:
+                sent["own_replay"] = self._sent(judged.number, replay_of(record), lease, lost)
         except InputError:
-            return None
-        judged.record.unlink()
+            return sent
+        return sent
+
+    def _sent(self, number: int, page: str, lease: dict[str, Any], lost: threading.Event) -> str | None:
+        """Send a page, and return its SHA-256; None if it is too large for the service."""
         where = f"/worker/chunks/{lease['chunk']}/replays?token={lease['token']}"
         packed = gzip.compress(page.encode(), 6, mtime=0)
         try:
@@ -205,7 +213,7 @@ class Worker:
                 "digest"
             ]
         except RefusalError as error:  # too large for the service: the result counts without it
-            log.warning("a replay is refused", trial=judged.number, error=str(error))
+            log.warning("a replay is refused", trial=number, error=str(error))
             return None
 
 
@@ -218,13 +226,23 @@ def lacks_room(error: BaseException | None) -> bool:
     return False
 
 
-def replay_of(record: Path) -> str:
+def without_words(record: Record) -> Record:
+    """Return a record without the details of its end and events, which may quote a controller; the same if none has."""
+    said = (*record.frames.events, *filter(None, (record.ending,)))
+    if not any(one.detail for one in said):
+        return record
+    events = tuple(dataclasses.replace(event, detail="") for event in record.frames.events)
+    frames = dataclasses.replace(record.frames, events=events)
+    return dataclasses.replace(
+        record, frames=frames, ending=record.ending and dataclasses.replace(record.ending, detail="")
+    )
+
+
+def replay_of(found: Record) -> str:
     """Return the page that replays a record, with its score; InputError if it holds no frame."""
-    from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.score import score
     from dubins_traffic.viewer.replay import replay_page
 
-    found = load_record(str(record))
     scored = score(found)
     told = {
         "counted_rounds": scored.counted_rounds,

@@ -2,7 +2,7 @@
 
 from dubins_traffic.protocols import End
 from dubins_traffic.sandbox.attacks.attack import Attack
-from dubins_traffic.sandbox.layers import FILES, JUDGE, MEMORY, PROCESSES, RLIMITS
+from dubins_traffic.sandbox.layers import FILES, JUDGE, MEMORY, PROCESSES, RLIMITS, SECCOMP
 
 FORKS = """
 made = []
@@ -12,6 +12,17 @@ while len(made) < 80:
         time.sleep(600); os._exit(0)
     made.append(child)
 got = len(made)
+"""
+
+FILL = """
+read, write = os.pipe()
+def full(pair, size=60_000):
+    for each in pair:
+        each.setblocking(False)
+        try:
+            while True: each.send(bytes(size))
+        except OSError: pass
+    return pair
 """
 
 BOMBS = (
@@ -34,6 +45,56 @@ for each in held:
     for place in range(0, len(each), 4096): each[place] = 1
 got = len(held)
 """),
+    Attack("memory in sockets", (MEMORY, JUDGE), FILL + """
+for _ in range(16):
+    if os.fork() == 0:
+        held = []
+        while True:
+            try: held.append(full(socket.socketpair()))
+            except OSError: break
+        os.write(write, b'.'); time.sleep(600)
+while len(got or '') < 16: got = (got or '') + os.read(read, 1).decode()
+""", alone=False),
+    Attack("memory in large datagrams", (MEMORY, JUDGE), FILL + """
+for _ in range(16):
+    if os.fork() == 0:
+        held = []
+        while True:
+            try: held.append(full(socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM), 180_000))
+            except OSError: break
+        os.write(write, b'.'); time.sleep(600)
+while len(got or '') < 16: got = (got or '') + os.read(read, 1).decode()
+""", alone=False),
+    Attack("memory in sockets that are under way", (SECCOMP, MEMORY, JUDGE), FILL + """
+import array
+for _ in range(16):
+    if os.fork() == 0:
+        far, near = socket.socketpair()
+        for _ in range(40):
+            pair = full(socket.socketpair())
+            far.sendmsg([b'x'], [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array('i', [each.fileno() for each in pair]))])
+            for each in pair: each.close()
+        os.write(write, b'.'); time.sleep(600)
+    time.sleep(0.01)
+while len(got or '') < 16:
+    said = os.read(read, 1).decode()
+    got = (got or '') + said
+    if not said: raise OSError('none of them was filled')
+""", alone=False),
+    Attack("memory in pipes", (MEMORY, JUDGE), FILL + """
+for _ in range(40):
+    if os.fork() == 0:
+        held = []
+        while True:
+            try: pair = os.pipe()
+            except OSError: break
+            held.append(pair); os.set_blocking(pair[1], False)
+            try:
+                while True: os.write(pair[1], bytes(4096))
+            except OSError: pass
+        os.write(write, b'.'); time.sleep(600)
+while len(got or '') < 40: got = (got or '') + os.read(read, 1).decode()
+""", alone=False, limits=(("memory", 112 << 20),)),
     Attack("memory that is locked", (RLIMITS,), "place = ctypes.create_string_buffer(8 << 20); call(149, place, 8 << 20); got = 'locked'", alone=False),
     Attack("processes", (PROCESSES, RLIMITS), FORKS),
     Attack("threads", (PROCESSES, RLIMITS), """
@@ -89,6 +150,14 @@ time.sleep(600)
 """, End.OUT_OF_TIME, alone=False),
     Attack("processor time of children that nobody waits for", (JUDGE,), """
 signal.signal(signal.SIGCHLD, signal.SIG_IGN)
+while True:
+    if os.fork() == 0:
+        spin(0.005); os._exit(0)
+    time.sleep(0.005)
+""", (End.OUT_OF_TIME, End.PEER_GARBAGE), alone=False),
+    Attack("processor time of children, by a number that is cut", (JUDGE,), """
+ignore = ctypes.create_string_buffer(struct.pack('QQQQ', 1, 0x04000000, 0, 0))
+call(13, (1 << 32) | 17, ignore, None, 8)
 while True:
     if os.fork() == 0:
         spin(0.005); os._exit(0)

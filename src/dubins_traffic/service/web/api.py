@@ -14,6 +14,7 @@ from dubins_traffic.service import receiving, standings, viewing
 from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.tables import Competition
+from dubins_traffic.service.web import bodies
 from dubins_traffic.service.web import viewer as who
 from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
 
@@ -67,7 +68,7 @@ class Api(Controller):
             row = receiving.found_phase(session, slug, name)
             if not viewing.sees_table(row, viewer.account, at):
                 return []
-            latest = standings.latest_standing(session, row)
+            latest = standings.latest_standing(session, row, office.hiding(row))
             if viewer.organiser or row.is_closed(at):
                 return [] if latest is None else list(latest.places)
             return standings.shown_table(office.phase(row), latest)
@@ -94,7 +95,12 @@ class Api(Controller):
             found = receiving.submissions_of(session, row, viewer.person.team_id)
             return [viewing.told_submission(office, session, one, viewer.person, places) for one in found]
 
-    @post("/competitions/{slug:str}/phases/{name:str}/submissions", sync_to_thread=True, guards=[who.person])
+    @post(
+        "/competitions/{slug:str}/phases/{name:str}/submissions",
+        sync_to_thread=True,
+        guards=[who.person],
+        opt={bodies.FILES: True},
+    )
     def submit(
         self,
         office: OfficeHere,

@@ -13,7 +13,6 @@ from litestar.di import Provide
 from litestar.exceptions import HTTPException
 from litestar.middleware import DefineMiddleware
 from litestar.middleware.rate_limit import RateLimitConfig
-from litestar.middleware.session.server_side import ServerSideSessionConfig
 from litestar.openapi import OpenAPIConfig
 from litestar.openapi.plugins import JsonRenderPlugin
 from litestar.openapi.spec import Components, SecurityScheme
@@ -33,7 +32,9 @@ from dubins_traffic.service.settings import Settings
 from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import api, doors, login, metrics, organisers, pages, submitting, team
+from dubins_traffic.service.web.bodies import Bodies
 from dubins_traffic.service.web.said import moment
+from dubins_traffic.service.web.sessions import SessionConfig
 from dubins_traffic.service.web.viewer import PROGRAMS, Recognition, Viewer
 
 log = structlog.get_logger("dubins_traffic.service")
@@ -65,7 +66,7 @@ STATUS = {
 def create_app(office: Office) -> Litestar:
     """Return the application of a service."""
     settings = office.settings
-    largest = max(settings.largest_upload, settings.largest_replay) << 20
+    largest = (max(settings.largest_upload, settings.largest_replay) << 20) + (1 << 20)
 
     async def give_office() -> Office:
         return office
@@ -78,7 +79,7 @@ def create_app(office: Office) -> Litestar:
     return Litestar(
         route_handlers=[*handlers, doors.Doors, metrics.metrics, files],
         dependencies={"office": Provide(give_office), "viewer": Provide(_viewer)},
-        middleware=_middleware(settings),
+        middleware=_middleware(settings, largest),
         csrf_config=CSRFConfig(
             office.cookie_secret,
             cookie_name=f"{_prefix(settings)}csrf",
@@ -91,7 +92,7 @@ def create_app(office: Office) -> Litestar:
         on_startup=[kept.delete_expired],
         exception_handlers=dict.fromkeys((HTTPException, *STATUS), _answer_to),  # pyright: ignore[reportArgumentType]
         after_request=_with_headers,
-        request_max_body_size=largest + (1 << 20),
+        request_max_body_size=largest,
         logging_config=None,
         openapi_config=_described(settings.name),
         state=_state(office),
@@ -103,11 +104,11 @@ def _prefix(settings: Settings) -> str:
     return "__Host-" if settings.secure else ""
 
 
-def _middleware(settings: Settings) -> list[Any]:
+def _middleware(settings: Settings, largest: int) -> list[Any]:
     guessing = RateLimitConfig(
         rate_limit=("minute", settings.logins), check_throttle_handler=_is_guess, set_rate_limit_headers=False
     )
-    sessions = ServerSideSessionConfig(
+    sessions = SessionConfig(
         key=f"{_prefix(settings)}session",
         secure=settings.secure,
         samesite="lax",
@@ -115,7 +116,8 @@ def _middleware(settings: Settings) -> list[Any]:
         exclude=WITHOUT_SESSION,
     )
     recognition = DefineMiddleware(Recognition, exclude=["^/static/"])
-    return [guessing.middleware, sessions.middleware, recognition]
+    bodies = DefineMiddleware(Bodies, largest=largest)
+    return [guessing.middleware, sessions.middleware, recognition, bodies]
 
 
 def _templates() -> JinjaTemplateEngine:

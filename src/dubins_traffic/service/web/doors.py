@@ -15,9 +15,10 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.service import housekeeping, queue, submissions
+from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Chunk, Submission, Worker
-from dubins_traffic.service.web import viewer
+from dubins_traffic.service.web import bodies, viewer
 from dubins_traffic.service.web.viewer import OfficeHere
 
 Digest = Annotated[str, PathParameter(pattern="^[0-9a-f]{64}$", examples=[Example(value="0" * 64)])]
@@ -61,7 +62,10 @@ class Released(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Result(msgspec.Struct, forbid_unknown_fields=True):
-    """What came of a trial, as `dubins_traffic.competition.judging.Judged` has it."""
+    """What came of a trial, as `dubins_traffic.competition.judging.Judged` has it.
+
+    `replay` is for everybody, `own_replay` for the team: one in which its controller has its words.
+    """
 
     number: Whole
     row: dict[str, Any]
@@ -70,6 +74,7 @@ class Result(msgspec.Struct, forbid_unknown_fields=True):
     log: LongText
     frames: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None
     replay: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None
+    own_replay: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None
 
 
 class Report(msgspec.Struct, forbid_unknown_fields=True):
@@ -119,7 +124,7 @@ class Doors(Controller):
 
         office.database.patiently(renew)
 
-    @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK)
+    @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK, opt={bodies.FILES: True})
     async def replay(
         self,
         office: OfficeHere,
@@ -133,9 +138,14 @@ class Doors(Controller):
         data = await request.body()
         if not data.startswith(b"\x1f\x8b"):
             raise ClientException("a replay is packed by gzip")
-        return {"digest": await asyncio.to_thread(office.storage.put, data, "replays")}
+        return {"digest": await asyncio.to_thread(_keep_replay, office, number, data)}
 
-    @post("/chunks/{number:int}/done", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
+    @post(
+        "/chunks/{number:int}/done",
+        sync_to_thread=True,
+        status_code=HTTP_204_NO_CONTENT,
+        opt={bodies.FILES: True},
+    )
     def done(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Report]) -> None:
         """End a lease with its results; they and what follows from them are kept together, or not at all."""
         office.database.patiently(lambda session: _done(office, session, number, data))
@@ -146,13 +156,26 @@ class Doors(Controller):
 
         def give_back(session: Session) -> None:
             chunk = queue.held(session, number, data.token)
+            note = _note(chunk, data.note)
             if data.left:
-                queue.release(session, chunk, data.note, office.clock(), worker_left=True)
+                queue.release(session, chunk, note, office.clock(), worker_left=True)
             else:
-                housekeeping.give_back(session, chunk.id, data.note, office.clock())
+                housekeeping.give_back(session, chunk.id, note, office.clock())
             _seen(session, chunk.worker, office.clock(), "")
 
         office.database.patiently(give_back)
+
+
+def _keep_replay(office: Office, number: int, data: bytes) -> str:
+    with office.database.reading() as session:
+        chunk = session.get_one(Chunk, number)
+        kept = office.hiding(chunk.submission.phase).hide(data, replays_of(chunk))
+    return office.storage.put(kept, "replays")
+
+
+def _note(chunk: Chunk, told: str) -> str:
+    """Return why a lease ended without a result; a phase that does not show all keeps nothing of what a worker saw."""
+    return told if chunk.submission.phase.shows == "all" else f"the log of worker {chunk.worker} says why"
 
 
 def _lease(office: Office, session: Session, name: str) -> Leased | None:
@@ -182,9 +205,10 @@ def _done(office: Office, session: Session, number: int, report: Report) -> None
     chunk = queue.held(session, number, report.token)
     submission = chunk.submission
     if report.rejected is not None and chunk.kind != "check":
-        housekeeping.give_back(session, chunk.id, report.rejected, at)
+        housekeeping.give_back(session, chunk.id, _note(chunk, report.rejected), at)
     elif chunk.kind != "check":
-        submissions.record(session, chunk, [msgspec.to_builtins(own) for own in report.trials or ()], at)
+        results = [msgspec.to_builtins(own) for own in report.trials or ()]
+        submissions.record(session, chunk, results, at, office.hiding(submission.phase))
     elif report.rejected is not None:
         queue.finish(session, chunk)
         submissions.reject(session, submission, report.rejected, at)

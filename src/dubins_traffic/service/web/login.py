@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import secrets
 from typing import Any
 
 from litestar import Controller, Request, get, post
@@ -91,13 +92,12 @@ class Login(Controller):
 
 
 def keep(request: Asked, account: Account) -> None:
-    """Keep in the session whose it is, and the number of the password with which it was begun."""
-    session: Any = {"account": account.id, "epoch": account.epoch}
+    """Begin a session: whose it is, the number of the password with which it was begun, and what no other has."""
+    session: Any = {"account": account.id, "epoch": account.epoch, "begun": secrets.token_hex(16)}
     request.set_session(session)  # pyright: ignore[reportUnknownMemberType]
 
 
 def _enter(request: Asked, account: Account) -> Redirect:
     """Begin a session, and lead on."""
-    request.clear_session()
     keep(request, account)
     return Redirect("/", status_code=303)

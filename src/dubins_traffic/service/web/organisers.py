@@ -16,6 +16,7 @@ from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.tables import Account, Act, Competition, Submission, Team
+from dubins_traffic.service.web import bodies
 from dubins_traffic.service.web import viewer as who
 from dubins_traffic.service.web.said import Form, page
 from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
@@ -43,7 +44,7 @@ class Organisers(Controller):
         """Show the desk."""
         return _shown(office, viewer)
 
-    @post("/create", sync_to_thread=True)
+    @post("/create", sync_to_thread=True, opt={bodies.FILES: True})
     def create(
         self,
         office: OfficeHere,

@@ -12,6 +12,7 @@ from sqlalchemy import select
 
 from dubins_traffic.competition import sealing
 from dubins_traffic.service import receiving, standings, submissions, viewing
+from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.tables import Competition, Standing, Submission, Trial
@@ -80,7 +81,7 @@ class Pages(Controller):
             row = receiving.found_phase(session, slug, name)
             phase, told = office.phase(row), viewing.told_phase(office, row, at)
             sees = viewing.sees_table(row, viewer.account, at)
-            every: Sequence[Standing] = standings.history(session, row) if sees else ()
+            every: Sequence[Standing] = standings.history(session, row, office.hiding(row)) if sees else ()
             whole = row.is_closed(at) or viewer.organiser
             tables = [
                 (one.at, list(one.places) if whole else standings.shown_table(phase, one)) for one in every
@@ -119,10 +120,12 @@ class Pages(Controller):
         with office.database.reading() as session:
             submission, found = _seen(office, viewer, number, trial, session)
             own = viewing.owns(viewer.account, submission)
+            row = found.row if own else viewing.shared(found.row)
             given = {
                 "submission": submission,
                 "team": submission.team.name,
                 "trial": found,
+                "row": row,
                 "phase": submission.phase.name,
                 "slug": submission.phase.competition.slug,
                 "own": own,
@@ -136,11 +139,13 @@ class Pages(Controller):
     ) -> Response[bytes]:
         """Return the page that replays a trial, for a frame that may do nothing but draw."""
         with office.database.reading() as session:
-            _, found = _seen(office, viewer, number, trial, session)
-        if found.replay is None:
+            submission, found = _seen(office, viewer, number, trial, session)
+            hiding = office.hiding(submission.phase)
+            digest = viewing.replay_of(found, submission, viewer.account)
+        if digest is None:
             raise NotFoundException("this trial has no replay")
         headers = {"content-encoding": "gzip", "content-security-policy": REPLAY_POLICY}
-        data = office.storage.get(found.replay, "replays")
+        data = hiding.show(office.storage.get(digest, "replays"), replays_of(found))
         return Response(data, media_type="text/html; charset=utf-8", headers=headers)
 
     @get("/status", sync_to_thread=True)
@@ -161,7 +166,7 @@ def _seen(
         raise UnknownError("no such trial")
     if not viewing.sees_trials(submission.phase, viewer.account, submission, office.clock()):
         raise UnknownError("no such trial")
-    found = viewing.trial_of(session, submission, trial)
+    found = viewing.trial_of(office, session, submission, trial)
     if found is None:
         raise UnknownError("no such trial")
     return submission, found

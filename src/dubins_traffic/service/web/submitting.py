@@ -12,6 +12,7 @@ from litestar.response import Redirect, Template
 
 from dubins_traffic.service import receiving, viewing
 from dubins_traffic.service.office import Office
+from dubins_traffic.service.web import bodies
 from dubins_traffic.service.web import viewer as who
 from dubins_traffic.service.web.said import page
 from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
@@ -30,7 +31,7 @@ class Submitting(Controller):
     include_in_schema = False
     guards = [who.person]  # noqa: RUF012
 
-    @post("/c/{slug:str}/{name:str}/submit", sync_to_thread=True)
+    @post("/c/{slug:str}/{name:str}/submit", sync_to_thread=True, opt={bodies.FILES: True})
     def submit(
         self,
         office: OfficeHere,
@@ -72,6 +73,6 @@ def _view(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
         found = receiving.found_submission(session, number, viewer.account)
         places = viewing.places_of(session)
         told = viewing.told_submission(office, session, found, viewer.account, places, logs=False)
-        differing = viewing.differing(session, found) if "trials" in told else []
+        differing = viewing.differing(office, session, found) if "trials" in told else []
         closed = found.phase.is_closed(office.clock())
     return {"submission": told, "differing": differing, "closed": closed}

@@ -1,0 +1,204 @@
+"""What a phase must not show lies in no file and no row of the service, and is there for everybody when it may be."""
+
+from __future__ import annotations
+
+import base64
+import gzip
+import io
+import json
+import re
+import tempfile
+import zipfile
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from sqlalchemy import select
+
+from dubins_traffic.service import viewing
+from dubins_traffic.service.hiding import HiddenError
+from dubins_traffic.service.office import Office
+from dubins_traffic.service.tables import Phase, Submission, Trial
+from tests import postgres
+from tests.services import CRASHING, Person, competition_text, serving, wait_until
+
+SAID = "swordfish"
+SAYING = f"""
+class Controller:
+    def start(self, problem):
+        print("{SAID[::-1]}"[::-1])
+
+    def act(self, observation):
+        return 0.2, 0.1
+"""
+SECRET = ("validation", "test")
+SOURCE = "no idea what to do"
+
+
+def forms(seed: int) -> set[bytes]:
+    """Return a seed as it may be written: digits, hexadecimal digits, bytes, and Base64 of these at any place."""
+    little, big = seed.to_bytes(8, "little"), seed.to_bytes(8, "big")
+    plain = {str(seed).encode(), f"{seed:016x}".encode(), f"{seed:016X}".encode(), little, big}
+    packed: set[bytes] = set()
+    for data in (*plain, little.hex().encode()):
+        for before in range(3):
+            whole = base64.b64encode(bytes(before) + data)
+            packed.add(whole[-(-before * 8 // 6) : (before + len(data)) * 8 // 6])
+    return plain | packed | {little.hex().encode()}
+
+
+def unpacked(data: bytes) -> Iterator[bytes]:
+    """Yield bytes, and what is packed by gzip in them."""
+    yield data
+    for found in re.finditer(rb"\x1f\x8b\x08", data):
+        try:
+            yield zlib.decompressobj(31).decompress(data[found.start() :])
+        except zlib.error:
+            continue
+
+
+def holding(folders: list[Path], wanted: set[bytes]) -> list[str]:
+    """Return the files in which something wanted stands."""
+    found: list[str] = []
+    for path in (each for folder in folders for each in sorted(folder.rglob("*"))):
+        try:
+            data = path.read_bytes() if path.is_file() else b""
+        except FileNotFoundError:  # of a worker that has just removed it
+            continue
+        found += [str(path) for part in unpacked(data) if any(form in part for form in wanted)][:1]
+    return found
+
+
+@pytest.fixture
+def open_folder() -> Iterator[Path]:
+    """A folder that other users may enter."""
+    with tempfile.TemporaryDirectory(prefix="secrecy-") as name:
+        Path(name).chmod(0o755)
+        yield Path(name)
+
+
+def test_nothing_of_a_secret_phase_is_written_in_clear_in_sqlite(tmp_path: Path) -> None:
+    a_season(tmp_path, "", [])
+
+
+def test_nothing_of_a_secret_phase_is_written_in_clear_in_postgresql(
+    tmp_path: Path, open_folder: Path
+) -> None:
+    with postgres.cluster(open_folder) as cluster:
+        a_season(tmp_path, f'database = "{cluster.url("secrecy")}"\n', [open_folder])
+
+
+@pytest.mark.parametrize("form", range(12))
+def test_a_seed_is_found_however_it_is_written(tmp_path: Path, form: int) -> None:
+    seed = 12067423490827346012
+    little, big = seed.to_bytes(8, "little"), seed.to_bytes(8, "big")
+    plain = [
+        str(seed).encode(),
+        f"{seed:x}".encode(),
+        f"{seed:X}".encode(),
+        little,
+        big,
+        little.hex().encode(),
+    ]
+    text = [*plain, *(base64.b64encode(b"a" * k + own) for k, own in enumerate(plain))][form]
+    (tmp_path / "page").write_bytes(gzip.compress(b"before " + text + b" after"))
+    assert holding([tmp_path], forms(seed)) == [str(tmp_path / "page")]
+    assert holding([tmp_path], forms(seed ^ 1 << 40)) == []
+
+
+def a_season(tmp_path: Path, settings: str, also: list[Path]) -> None:
+    """Judge two submissions in phases that hide their trials, and look at every byte until these may be seen."""
+    folder = tmp_path / "here"
+    (tmp_path / "short.toml").write_text(competition_text())
+    arguments = ("--trust-submissions", "--competition", str(tmp_path / "short.toml"))
+    with serving(folder, *arguments, settings=f"logins = 10000\n{settings}") as service:
+        organiser = service.organiser().with_token()
+        person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
+        seeds = seeds_of(folder)
+        assert all(len(own) == 2 for own in seeds.values())
+        secret = {form for own in seeds.values() for seed in own for form in forms(seed)}
+        secret |= {SAID.encode(), base64.b64encode(SAID.encode()), b"counted_rounds"}
+        numbers = [person.submit(f"short/{phase}", text) for phase in SECRET for text in (SAYING, CRASHING)]
+        looked_at = [folder, *also]
+        assert wait_until(lambda: holding(looked_at, secret) or all_ended(person, numbers)) is True
+        assert holding(looked_at, secret) == []
+        assert len(list((folder / "store" / "replays").rglob("*/*"))) > 4
+        shown_to_organisers(organiser, numbers[2])
+        unreadable(folder, tmp_path / "other.key", numbers[2])
+        for act in ("close", "reveal"):
+            assert organiser.post(f"/desk/c/short/test/{act}", form="/desk/c/short").status_code == 303
+        assert [Path(one).name for one in holding(looked_at, set(forms(seeds["test"][0])))] == [
+            "test.seeds.txt"
+        ]
+        shown_to_all(service.person(), seeds["test"], numbers[2:])
+        others_see_no_words(service.person().join(organiser.invite(), "Bob", "Bees"), numbers[3])
+        told = person.get(f"/s/{numbers[3]}/trials/0").text
+        assert SOURCE in told.partition("<h2>Log")[0]
+        assert SOURCE in person.get(f"/s/{numbers[3]}/trials/0/replay").text
+        exported(organiser, numbers[3])
+
+
+def seeds_of(folder: Path) -> dict[str, tuple[int, ...]]:
+    office = Office(folder, folder.with_suffix(".key"))
+    with office.database.reading() as session:
+        rows = session.scalars(select(Phase).where(Phase.name.in_(SECRET))).all()
+        found = {row.name: office.seeds(row) for row in rows}
+    office.close()
+    return found
+
+
+def all_ended(person: Person, numbers: list[int]) -> bool:
+    return all(person.state(number) in ("done", "finished") for number in numbers)
+
+
+def shown_to_organisers(organiser: Person, number: int) -> None:
+    assert SAID in organiser.get(f"/s/{number}/trials/1").text
+    assert organiser.get(f"/s/{number}/trials/1/replay").status_code == 200
+    assert len(organiser.api("GET", f"/submissions/{number}").json()["trials"]) == 2
+
+
+def unreadable(folder: Path, other: Path, number: int) -> None:
+    """With another key nothing can be read, and nothing of one trial stands for another."""
+    office, own = Office(folder, other), Office(folder, folder.with_suffix(".key"))
+    with office.database.reading() as session:
+        submission = session.get_one(Submission, number)
+        with pytest.raises(HiddenError, match="another key"):
+            viewing.trial_of(office, session, submission, 0)
+        first, second = session.scalars(select(Trial).where(Trial.submission_id == number)).all()
+        assert viewing.trial_of(own, session, submission, 0) is not None
+        first.hidden, second.hidden = second.hidden, first.hidden
+        with session.no_autoflush, pytest.raises(HiddenError, match="changed"):
+            own.hiding(submission.phase).shown(first)
+        session.rollback()
+    office.close()
+    own.close()
+
+
+def shown_to_all(anybody: Person, seeds: tuple[int, ...], numbers: list[int]) -> None:
+    revealed = anybody.get("/c/short/test/seeds.txt").text.split()
+    assert all(str(seed) in revealed for seed in seeds)
+    for number in numbers:
+        for trial, seed in enumerate(seeds):
+            assert str(seed) in anybody.get(f"/s/{number}/trials/{trial}/replay").text
+    table = wait_until(lambda: anybody.api("GET", "/competitions/short/phases/test/table").json())
+    assert {place["entry"] for place in table} == {"Ants"}
+
+
+def others_see_no_words(other: Person, number: int) -> None:
+    page = other.get(f"/s/{number}/trials/0").text
+    assert "controller_fault" in page
+    replay = other.get(f"/s/{number}/trials/0/replay").text
+    assert "controller_fault" in replay
+    for text in (page, replay):
+        assert SOURCE not in text
+        assert "raise RuntimeError" not in text
+    assert other.get(f"/s/{number}").status_code == 404
+
+
+def exported(organiser: Person, number: int) -> None:
+    with zipfile.ZipFile(io.BytesIO(organiser.get("/desk/c/short/export.zip").content)) as archive:
+        rows = json.loads(archive.read(f"test/results-{number}.json"))
+        assert [(row["end"], row["reason"]) for row in rows] == [("controller_fault", None)] * 2
+        told = [archive.read(name) for name in archive.namelist() if not name.startswith("submissions/")]
+    assert not any(SOURCE.encode() in data for data in told)
