@@ -139,6 +139,37 @@ class TransportConformance:
         assert result.ending.end is (End.DEADLINE if clock.lockstep else End.PEER_SILENT)
         assert result.ending.ticks >= 5
 
+    @pytest.mark.parametrize("hangs_up", [False, True], ids=["silent", "gone"])
+    def test_a_peer_that_goes_just_before_the_planned_end(self, hangs_up: bool) -> None:
+        """What is left of the trial is shorter than the patience with a silent peer."""
+        then = (lambda peer: peer.hang_up()) if hangs_up else None
+        result = self.run(answer(until=40, then=then), RealTime(2.0))
+        gone = hangs_up and self.detects_loss
+        assert result.ending.end is (End.PEER_LOST if gone else End.PEER_SILENT)
+        assert result.ending.ticks < self.ticks
+
+    def test_an_e_agent_that_goes_just_before_the_planned_end(self) -> None:
+        result = self.run(answer(until=40), RealTime(2.0), car="agent0")
+        assert result.ending.end is End.AGENT_FAULT
+        assert result.ending.detail.startswith("agent0: peer_silent")
+
+    def test_a_peer_that_is_late_at_the_planned_end(self) -> None:
+        def behave(peer: Any) -> None:
+            answer(until=50)(peer)
+            time.sleep(1.5)  # the planned end passes meanwhile
+            while (tick := peer.frame()) is not None:
+                peer.send(*slalom(tick), tick)
+
+        self.patience = replace(self.patience, silence=PATIENT)
+        result = self.run(behave, RealTime(2.0))
+        assert result.ending.end is End.DURATION
+
+    def test_a_peer_that_seldom_answers_is_not_waited_for_at_the_planned_end(self) -> None:
+        """It answers in its usual time, or would: the last frames of the trial are not among those it answers."""
+        self.patience = replace(self.patience, silence=PATIENT)
+        result = self.run(answer(skip=lambda tick: tick % 20 != 0), RealTime(2.0))
+        assert result.ending.end is End.DURATION
+
     def test_a_peer_that_never_speaks(self) -> None:
         with self.link(Lockstep(SOON)) as link:
             link._patience = replace(self.patience, begin=0.3)

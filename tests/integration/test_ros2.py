@@ -243,6 +243,27 @@ def test_faulty_clients_end_their_trials_and_the_session_goes_on(
     assert ends == ["peer_silent", "peer_silent", "peer_flood", "controller_fault", "reset"]
 
 
+def test_clients_that_go_less_than_the_silence_before_the_planned_end(
+    domain: int, config: str, tmp_path: Path
+) -> None:
+    """Four seconds are shorter than the silence that is borne, and than DDS takes to notice that one was killed."""
+    arguments = ("ros2", "run", config, "--trials", "3", "--records", str(tmp_path), "--json")
+    with running(COMMAND, *arguments) as session:
+        for number, action in enumerate(("die", "stop")):
+            with running(sys.executable, "-m", "tests.ros2_client", str(domain), action):
+                await_end(tmp_path / f"trial-{number:04d}.wall.json")
+        client = Client(domain)
+        client.until(START)
+        client.instance()
+        client.drive()
+        out, err = session.communicate(timeout=600)
+        client.graph.close()
+    assert session.returncode == 1, err
+    ends = [trial["end"] for trial in json.loads(out)["trials"]]
+    assert ends == ["peer_silent", "peer_silent", "duration"]
+    assert dt.verify(tmp_path / "trial-0000.mcap").verified
+
+
 def await_end(sidecar: Path) -> None:
     """Wait until a trial is over."""
     until = time.monotonic() + 600

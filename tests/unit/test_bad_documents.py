@@ -148,6 +148,7 @@ CONFIGURATIONS: list[tuple[str, Document, str, str | None, str]] = [
         base(e_agents=[WANDER | {"speed": 0.3}]), "e-agents[0].speed", "0.3", "in parameters",
     ),
     ("unknown key of the car", base(car={"weight": 3}), "car.weight", "3", "one of w, body, bounds"),
+    ("misspelt key of the car", base(car={"bound": 3}), "car.bound", "3", "bounds, or one of w, body"),
     ("car without width", base(car={"w": 0}), "car.w", "0", ">= 0.001"),
     ("two bodies", base(car={"body": {"disc": {}, "rectangle": {"length": 1, "width": 1}}}), "car.body", "{", "either"),
     ("no rectangle width", base(car={"body": {"rectangle": {"length": 1}}}), "car.body.rectangle.width", None, "m"),

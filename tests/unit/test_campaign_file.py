@@ -136,6 +136,14 @@ def test_paths_lead_through_objects_and_lists() -> None:
     }
 
 
+def test_a_misspelt_key_comes_before_the_one_that_is_missing_for_it() -> None:
+    misspelt = {"controlers" if key == "controllers" else key: value for key, value in BASE.items()}
+    with pytest.raises(InputError) as caught:
+        Campaign.from_document(misspelt, "c.toml")
+    assert str(caught.value).startswith("c.toml: controlers: unknown key (and 1 more fault): got ['lanes'")
+    assert "expected controllers, or one of version, " in str(caught.value)
+
+
 WRONG: list[tuple[dict[str, Any], str]] = [
     ({"version": 1}, "c.toml: version: wrong value: got 1"),
     ({"controllers": []}, "c.toml: controllers: wrong value: got []; expected at least 1 items"),

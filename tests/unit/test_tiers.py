@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import dubins_traffic
+from dubins_traffic.errors import InputError
 from dubins_traffic.kernels import asking, companion, compile, store
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
@@ -239,10 +240,16 @@ def test_kernels_that_are_never_compiled_are_plain_functions(tmp_path) -> None:
     assert not list(tmp_path.iterdir())
 
 
-def test_another_tier_is_refused_by_name(monkeypatch) -> None:
-    monkeypatch.setenv("DUBINS_TRAFFIC_KERNELS", "quick")
-    with pytest.raises(Exception, match=r"DUBINS_TRAFFIC_KERNELS: .*'quick'.*auto or compiled"):
-        compile.waits()
+@pytest.mark.parametrize("asked", [compile.waits, compile.never_compiled])
+def test_another_tier_is_refused_by_name(asked, monkeypatch) -> None:
+    """Also where nobody would have to wait, since all kernels are compiled."""
+    monkeypatch.setenv("DUBINS_TRAFFIC_KERNELS", "compield")
+    with pytest.raises(InputError, match=r"DUBINS_TRAFFIC_KERNELS: .*'compield'.*auto or compiled"):
+        asked()
+    run = [sys.executable, "-m", "dubins_traffic.cli", "verify", "nothing.mcap"]
+    done = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert "compield" in done.stderr
 
 
 def test_kinds_can_be_read_back() -> None:

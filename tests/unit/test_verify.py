@@ -246,7 +246,7 @@ def test_events_of_the_end_are_compared(given_up: bytes, tmp_path: Path) -> None
 
 def test_what_other_programs_add_to_the_file_is_refused(data: bytes, tmp_path: Path) -> None:
     found = outcome(data + b"\0", tmp_path / "a.mcap")
-    assert "byte" in str(found)
+    assert str(found) == f"differs: byte {len(data)} of the file: recorded 00, expected the end of the file"
 
 
 def test_another_instance_is_refused_where_the_right_one_is_given(data: bytes, tmp_path: Path) -> None:

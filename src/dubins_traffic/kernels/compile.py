@@ -122,7 +122,7 @@ def is_quick(kernel: Callable[..., Any]) -> bool:
 def never_compiled() -> bool:
     """Tell whether kernels stay plain functions for ever."""
     off = os.environ.get("NUMBA_DISABLE_JIT", "").strip()
-    return off not in ("", "0") or os.environ.get(TIER) == "interpreted" or caches_are_off()
+    return _tier() == "interpreted" or off not in ("", "0") or caches_are_off()
 
 
 def caches_are_off() -> bool:
@@ -140,17 +140,16 @@ def caches_are_off() -> bool:
 
 
 def waits() -> bool:
-    """Tell whether a call waits until its kernel is compiled.
+    """Tell whether a call waits until its kernel is compiled."""
+    return _tier() == "compiled"
 
-    Raises
-    ------
-    InputError
-        If the environment variable that says so says something else.
-    """
+
+def _tier() -> str:
+    """Return the tier that the environment names, the first without one; InputError for another word."""
     tier = os.environ.get(TIER) or TIERS[0]
     if tier not in TIERS:
         raise InputError("no such tier", file=TIER, value=tier, expected=" or ".join(TIERS))
-    return tier == "compiled"
+    return tier
 
 
 @contextmanager

@@ -89,12 +89,13 @@ def parse(model: type[M], document: object, *, file: str | None = None, field: s
     Raises
     ------
     InputError
-        For the first thing wrong, below `field`; says how many more there are.
+        For the first thing wrong, below `field`; says how many more there are. A key that is unknown comes before one
+        that is missing, which it may be, misspelt.
     """
     try:
         return model.model_validate(document)
     except ValidationError as error:
-        details = error.errors(include_url=False)
+        details = sorted(error.errors(include_url=False), key=lambda one: one["type"] == "missing")
         first = _translate(model, details[0])
         if len(details) > 1:
             first.problem += more_faults(len(details) - 1)
@@ -165,6 +166,9 @@ def _inner(annotation: Any) -> type[BaseModel] | None:
 def _known_keys(model: type[BaseModel], location: Sequence[int | str]) -> str:
     owner = _owner(model, location)
     names = [info.alias or name for name, info in owner.model_fields.items()] if owner else []
+    near = get_close_matches(str(location[-1]), names, n=1)
+    if near:
+        return ", or one of ".join((near[0], ", ".join(name for name in names if name != near[0])))
     return "one of " + ", ".join(names) if names else "no such key"
 
 

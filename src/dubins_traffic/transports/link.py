@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from time import monotonic
 from typing import TYPE_CHECKING, Any
 
-from dubins_traffic.cars.state import EGO, Labels, Observation, State
+from dubins_traffic.cars.state import Labels, Observation, State
 from dubins_traffic.errors import PeerError
-from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Clock, End, Ending, Looks, Polled, Streams, Transport, View
 from dubins_traffic.transports.inbox import Inbox, Slot
 from dubins_traffic.transports.patience import Patience
 from dubins_traffic.transports.punctuality import Punctuality
-from dubins_traffic.transports.shown import between, kept, onward
+from dubins_traffic.transports.shown import Sights, between, kept, onward
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -26,7 +26,6 @@ IDLE = 0.1
 AGAIN = 1.0
 """Seconds after which a frame that nobody answers is sent again, where answers say what they answer."""
 NEVER_BY_ITSELF = 1e9
-SIGHT = 1e150
 
 
 class Link:
@@ -67,7 +66,7 @@ class Link:
         self._remote = [agent.name for agent in instance.e_agents if agent.kind == REMOTE]
         if self.ego:
             self._remote.insert(0, EGO_NAME)
-        self._senses: dict[int, Senses] = {}
+        self._sights = Sights(instance)
         self._running = False
         self._moving = False
         self._announced = 0.0
@@ -83,9 +82,9 @@ class Link:
             due = self.clock.due(tick)
             self._pass_time(due, state)
             self._slip(due)
-        self._tick, self._own = tick, observe
+        self._tick = tick
         self._state, self._labels = kept(state, labels) if self._between else (state, labels)
-        self._seen: dict[int, Observation] = {}
+        self._sights.take(tick, self._state, self._labels, observe)
         if self._running:
             self._halt()
         self._send()
@@ -123,7 +122,7 @@ class Link:
             back = monotonic() + self._patience.absence + IDLE
             answered = self._wait(lambda: self._answers_frame(slot, tick), back, car)
         if answered and slot.arrived is not None:
-            self._punctuality.answers[car].append(max(0.0, slot.arrived - self._sent))
+            self._punctuality.answered(car, slot.arrived - self._sent)
             if self._repeated:
                 self._settle()
         elif self.clock.lockstep:
@@ -131,8 +130,10 @@ class Link:
                 End.DEADLINE.value, f"no command within {until - self._sent:.3g} s at tick {tick}"
             )
         else:
-            self._punctuality.late[car] += 1
+            self._punctuality.missed(car)
             self._check_silence(slot, tick)
+            if tick == self._instance.ticks - 1 and (self._has_gone(slot) or self._punctuality.fades(car)):
+                self._hear_out(slot, car, tick)
         with self.inbox.condition:
             return slot.speed, slot.yaw_rate
 
@@ -196,6 +197,17 @@ class Link:
         if monotonic() - since > patience and not self._has_gone(slot):
             detail = f"no command for {patience:g} s at tick {tick}"
             raise PeerError(End.PEER_SILENT.value, detail)
+
+    def _hear_out(self, slot: Slot, car: str, tick: int) -> None:
+        """Put the last tick off until a peer that seems to have gone speaks, or is named: no later tick could name it.
+
+        Where the world is streamed its time goes on meanwhile, for programs that drive by that time.
+        """
+        with self._standing_still():
+            self._running = self._stream is None
+            while not self._wait(lambda: slot.fresh, monotonic() + AGAIN + IDLE, car):
+                self._check_silence(slot, tick)
+            self._running = True
 
     def _has_gone(self, slot: Slot) -> bool:
         """Look whether the peer that does not answer has gone: a busy machine may not have told yet."""
@@ -298,10 +310,15 @@ class Link:
         """Let time stand still while the world is paused."""
         if not self.inbox.paused:
             return
+        with self._standing_still():
+            self.idle(lambda: not self.inbox.paused)
+            self._settle()
+
+    @contextmanager
+    def _standing_still(self) -> Iterator[None]:
         began = monotonic()
         self._moving = False
-        self.idle(lambda: not self.inbox.paused)
-        self._settle()
+        yield
         self._moving = True
         self.clock.shift(monotonic() - began)
 
@@ -321,26 +338,13 @@ class Link:
 
     def _send_again(self) -> None:
         self._next_view = monotonic() + self._interval
-        self.transport.frame(self._view(self._state, 0.0, self._observe))
+        self.transport.frame(self._view(self._state, 0.0, self._sights.observe))
 
     def _show(self, state: State, elapsed: float, now: float) -> None:
         self._next_view = max(self._next_view + self._interval, now)
         if self._stream is not None:
-            self._stream.stream(self._view(state, elapsed, lambda car: self._sense(car, state)))
+            self._stream.stream(self._view(state, elapsed, lambda car: self._sights.sense(car, state)))
 
     def _view(self, state: State, elapsed: float, observe: Callable[[int], Observation]) -> View:
         time = self._tick / self._instance.problem.rate + elapsed
         return View(self._tick, time, state, self._labels, observe, self._running)
-
-    def _observe(self, car: int) -> Observation:
-        """Return the observation of `car` in the present frame; the ego's is the trial's own."""
-        if car == EGO:
-            return self._own()
-        if car not in self._seen:
-            self._seen[car] = self._sense(car, self._state)
-        return self._seen[car]
-
-    def _sense(self, car: int, state: State) -> Observation:
-        if car not in self._senses:
-            self._senses[car] = Senses(self._instance, car, None if car == EGO else SIGHT)
-        return self._senses[car].observe(self._tick, state, self._labels)

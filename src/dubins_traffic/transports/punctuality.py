@@ -27,6 +27,26 @@ class Punctuality:
         """Seconds by which frames were sent later than due."""
         self.slipped = 0.0
         """Seconds by which the trial was put off in all."""
+        self._missed = dict.fromkeys(cars, 0)
+        """Ticks for which each car has had no command by now."""
+        self._longest = dict.fromkeys(cars, 0)
+        """The most such ticks between two of its commands."""
+
+    def answered(self, car: str, seconds: float) -> None:
+        """Note that a command of `car` came so long after its frame."""
+        if self.answers[car]:
+            self._longest[car] = max(self._longest[car], self._missed[car])
+        self._missed[car] = 0
+        self.answers[car].append(max(0.0, seconds))
+
+    def missed(self, car: str) -> None:
+        """Note that no command of `car` came within a tick."""
+        self.late[car] += 1
+        self._missed[car] += 1
+
+    def fades(self, car: str) -> bool:
+        """Tell whether `car` has been without a command for longer than ever between two of its commands."""
+        return self._missed[car] > self._longest[car]
 
     def slip(self, behind: float, tick: float) -> bool:
         """Note that a frame is `behind` seconds late; return whether it has slipped, by more than a `tick`."""

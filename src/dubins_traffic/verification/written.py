@@ -44,7 +44,8 @@ def written_difference(data: bytes, head: bytes, record: Record) -> Difference |
             return found
     pairs = zip(data, expected, strict=False)
     at = next((k for k, (one, two) in enumerate(pairs) if one != two), min(len(data), len(expected)))
-    return Difference(f"byte {at} of the file", data[at : at + 8].hex(), expected[at : at + 8].hex())
+    found, wanted = (file[at : at + 8].hex() or "the end of the file" for file in (data, expected))
+    return Difference(f"byte {at} of the file", found, wanted)
 
 
 def _piece_difference(own: Piece | None, other: Piece | None) -> Difference | None:
