@@ -27,6 +27,7 @@ kernels: .venv/.installed-dev
 
 tools: .venv/.installed-dev
 	@scripts/system-packages.sh
+	@scripts/kernel.sh
 	@scripts/crosscheck-tools.sh
 	@scripts/gazebo.sh
 
