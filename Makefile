@@ -27,9 +27,11 @@ kernels: .venv/.installed-dev
 
 tools: .venv/.installed-dev
 	@scripts/system-packages.sh
+	@scripts/kernel.sh
 	@scripts/crosscheck-tools.sh
 	@scripts/gazebo.sh
 
+test-all: export PYTEST_TIMEOUT := 86400
 test-all: test ## all tests, then those of which the suite runs a part, in full: hours
 	DUBINS_TRAFFIC_TRIALS_2016=50 $(BIN)/python -m pytest tests/integration/test_ros1_2016.py
 	DUBINS_TRAFFIC_MUTANTS=full $(BIN)/python -m pytest tests/integration/test_search_of_mutants.py -k mutant_stands

@@ -1,8 +1,8 @@
 #!/bin/sh
 # Install the system packages that the tests need: Chromium and its driver, for the tests of pages; nginx, PostgreSQL and
 # SQLite's command, for the tests of the service; ROS 1, a compiler and Fast DDS, for the tests over ROS 1 and 2;
-# bubblewrap, libseccomp, podman and user-mode Linux, for boxes (docs/sandbox.md). Does nothing where they are, and says
-# in one line what it can't install; the status is 0 either way.
+# bubblewrap, libseccomp and podman, for boxes (docs/sandbox.md), and QEMU, for a kernel of its own. Does nothing where they
+# are, and says in one line what it can't install; the status is 0 either way.
 set -eu
 
 ros="python3-rospy python3-rosmaster python3-roslaunch python3-genpy python3-gencpp python3-nav-msgs"
@@ -18,7 +18,8 @@ installed() {
 
 missing=""
 has chromium chromedriver || missing="chromium chromium-driver"
-installed bubblewrap libseccomp2 podman user-mode-linux || missing="$missing bubblewrap libseccomp2 podman user-mode-linux"
+installed bubblewrap libseccomp2 podman || missing="$missing bubblewrap libseccomp2 podman"
+has qemu-system-x86_64 || missing="$missing qemu-system-x86"
 # shellcheck disable=SC2086 # a list of words
 installed $ros || missing="$missing $ros"
 installed nginx openssl postgresql-15 sqlite3 || missing="$missing nginx openssl postgresql-15 sqlite3"

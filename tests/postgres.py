@@ -41,7 +41,7 @@ class Cluster:
             [*drop, str(BINARIES / name), *arguments],
             check=True,
             capture_output=True,
-            timeout=120,
+            timeout=600,
             cwd=self._folder,
             env={"PATH": os.environ["PATH"], "LC_ALL": "C.UTF-8", "HOME": str(self._folder)},
         )

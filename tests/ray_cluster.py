@@ -71,7 +71,7 @@ def running() -> Generator[RayCluster]:
             yield RayCluster(process)
         finally:
             _there(process.stdin).close()
-            process.wait(timeout=60)
+            process.wait(timeout=600)
 
 
 def main() -> None:

@@ -53,7 +53,7 @@ class Store:
             self._process = subprocess.Popen(
                 [*command, f"127.0.0.1:{self.port}"], stdout=log, stderr=log, env={**os.environ, **keys}
             )
-        wait_until(self._answers, 60, pause=0.05)
+        wait_until(self._answers, pause=0.05)
 
     def stop(self) -> None:
         """End it without a warning."""

@@ -18,7 +18,7 @@ import httpx
 
 COMMAND = (sys.executable, "-m", "dubins_traffic.cli")
 PASSWORD = "correct horse battery"
-WAIT_S = 240.0
+WAIT_S = 600.0
 """How long a test waits for what must happen."""
 
 STANDING = """
@@ -101,7 +101,7 @@ class Person:
     """Somebody with a browser: cookies, forms with their hidden fields, no redirect taken unseen."""
 
     def __init__(self, url: str, **options: Any) -> None:
-        self.http = httpx.Client(base_url=url, follow_redirects=False, timeout=60, **options)
+        self.http = httpx.Client(base_url=url, follow_redirects=False, timeout=600, **options)
         self.url, self.token = url, ""
 
     def get(self, path: str) -> httpx.Response:
@@ -131,7 +131,7 @@ class Person:
 
     def api(self, method: str, path: str, **given: Any) -> httpx.Response:
         headers = {"authorization": f"Bearer {self.token}"} if self.token else {}
-        return httpx.request(method, f"{self.url}/api{path}", headers=headers, timeout=60, **given)
+        return httpx.request(method, f"{self.url}/api{path}", headers=headers, timeout=600, **given)
 
     def submit(self, phase: str, source: str | bytes, name: str = "controller.py") -> int:
         """Hand in a submission on the page of a phase, as COMPETITION/PHASE; return its number."""
@@ -219,7 +219,7 @@ def serving(
         if not (folder / "joined").exists():
             code = process.stdout.readline().strip().rpartition("=")[2]
             (folder / "joined").touch()
-        wait_until(lambda: answers(url), 60)
+        wait_until(lambda: answers(url))
         service = Service(process, url, code, folder)
         people = service.people
         yield service
@@ -228,7 +228,7 @@ def serving(
             person.http.close()
         if process.poll() is None:
             process.terminate()
-            process.wait(timeout=60)
+            process.wait(timeout=600)
         process.stdout.close()
         said = log.read_text()
         assert "Fatal Python error" not in said, said[-5000:]

@@ -35,7 +35,7 @@ def network(request: pytest.FixtureRequest) -> RoadNetwork:
 def facts(tool: str, file: Path) -> dict[str, Any]:
     """Return what a tool's own reader finds in a file."""
     command = [interpreter_with(tool), str(HERE / f"{tool}_facts.py"), str(file)]
-    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stderr
     return json.loads(done.stdout.splitlines()[-1])
 
@@ -86,7 +86,7 @@ def test_sumo_runs_and_netconvert_reads(network: RoadNetwork, tmp_path: Path) ->
         ["netconvert", "--opendrive-files", "town.xodr", "-o", "drive.net.xml"],
     ):
         whole = [sumo_program(command[0]), *command[1:]]
-        done = subprocess.run(whole, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=300)
+        done = subprocess.run(whole, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=600)
         assert done.returncode == 0, done.stderr
         assert "rror" not in done.stderr, done.stderr
 

@@ -33,7 +33,7 @@ def network(request: pytest.FixtureRequest) -> RoadNetwork:
 def run(folder: Path, *command: str) -> None:
     """Run a program of SUMO in a folder."""
     whole = [sumo_program(command[0]), *command[1:]]
-    done = subprocess.run(whole, cwd=folder, capture_output=True, text=True, check=False, timeout=300)
+    done = subprocess.run(whole, cwd=folder, capture_output=True, text=True, check=False, timeout=600)
     assert done.returncode == 0, done.stderr
     assert "rror" not in done.stderr, done.stderr
 

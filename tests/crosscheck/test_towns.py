@@ -84,7 +84,7 @@ def test_the_same_town_by_way_of_opendrive(tmp_path: Path) -> None:
         "--opendrive-output",
         str(tmp_path / "bs.xodr"),
     ]
-    subprocess.run(command, check=True, capture_output=True, timeout=300)
+    subprocess.run(command, check=True, capture_output=True, timeout=600)
     document, losses = OpenDrive().reduced((tmp_path / "bs.xodr").read_text())
     assert losses.kept_share >= LEAST
     assert len(document["segments"]) == len(towns.reduced("bs3d").document["segments"])

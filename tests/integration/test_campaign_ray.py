@@ -21,8 +21,8 @@ pytest.importorskip("ray")
 
 DOCUMENT = campaign(controllers=["controllers.py:Slow", "simple"], trials=12)
 TRIALS = 2 * 4 * 12
-BOUND = 120.0
-"""Seconds within which the trials of a cluster must have begun."""
+BOUND = 600.0
+"""Seconds within which the trials of a cluster must have begun, and its loss be noticed."""
 SILENCE = 5.0
 """Seconds after which a silent cluster counts as lost here."""
 WIDE = ("--workers", "3")
@@ -78,7 +78,7 @@ def test_workers_nodes_and_the_head_are_killed(
         killer.start()
         assert main(command(file, lost / "out", *ray)[1:]) == 1
         killer.join()
-        assert time.monotonic() - killed[0] < SILENCE + 30.0
+        assert time.monotonic() - killed[0] < SILENCE + BOUND
         told = capsys.readouterr().err
         assert f"the Ray cluster at {cluster.address} is lost" in told
         assert f"of {TRIALS} trials are kept, --resume goes on" in told

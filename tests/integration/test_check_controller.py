@@ -177,6 +177,23 @@ def test_over_lcm_a_program_is_started_and_ended(capsys: pytest.CaptureFixture[s
     assert_well(capsys.readouterr().out)
 
 
+def test_a_command_that_ignores_ctrl_c_lets_the_program_hear_it() -> None:
+    pytest.importorskip("lcm")
+    command = f"{sys.executable} {ROOT / 'examples' / 'lcm' / 'controller.py'}"
+    deaf = [
+        "sh",
+        "-c",
+        "trap '' INT; exec \"$@\"",
+        "sh",
+        COMMAND,
+        "check-controller",
+        command,
+        "--over",
+        "lcm",
+    ]
+    assert_well(subprocess.run(deaf, check=False, capture_output=True, text=True, timeout=600).stdout)
+
+
 def test_over_ros1_a_node_is_started_and_ended(tmp_path: Path) -> None:
     need_ros()
     write_python(tmp_path)

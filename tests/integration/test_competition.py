@@ -249,13 +249,13 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
         text=True,
         start_new_session=True,
     ) as process:
-        deadline = time.monotonic() + 300
+        deadline = time.monotonic() + 600
         while not results.exists() or len(results.read_bytes().splitlines()) < 4:
             assert process.poll() is None
             assert time.monotonic() < deadline
             time.sleep(0.02)
         os.killpg(process.pid, signal.SIGINT)
-        _, stderr = process.communicate(timeout=300)
+        _, stderr = process.communicate(timeout=600)
     assert process.returncode == 1
     assert "of 200 trials are kept, the same command goes on" in stderr
     kept = len(load_evaluation(tmp_path / "out").results)

@@ -90,7 +90,7 @@ def test_a_signal_while_workers_begin_is_told_in_a_line(number, place):
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
         wait_until(lambda: len(children.read_text().split()) > 1, pause=0.01)
         process.send_signal(number)
-        _, said = process.communicate(timeout=240)
+        _, said = process.communicate(timeout=600)
     assert process.returncode == 1, said
     assert said.count("\n") == 1, said
     assert "interrupted; 0 of " in said

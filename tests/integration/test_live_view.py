@@ -25,7 +25,7 @@ def test_a_page_shows_each_picture_as_it_comes(tmp_path: Path) -> None:
             driver.get(view.url)
             for number, grey in enumerate((40, 200, 90), start=1):
                 view.show(np.full((50, 60, 3), grey, dtype=np.uint8))
-                WebDriverWait(driver, 60).until(
+                WebDriverWait(driver, 600).until(
                     lambda _, number=number: (
                         driver.execute_script("return document.body.dataset.shown") == str(number)
                     )

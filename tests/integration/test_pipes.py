@@ -100,7 +100,7 @@ def test_a_campaign_comes_through_a_pipe(pipe, place):
 def test_process_substitution():
     done = subprocess.run(
         ["bash", "-c", f"{COMMAND} run <(cat small.json) --controller simple --json"],
-        check=False, capture_output=True, text=True, timeout=300,
+        check=False, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert len(json.loads(done.stdout)["trials"]) == 2
@@ -121,7 +121,7 @@ def test_a_reader_that_has_had_enough_is_no_error(command):
     for reader in ("true", "head -1"):
         script = f"set -o pipefail; {COMMAND} {command} | {reader}"
         done = subprocess.run(
-            ["bash", "-c", script], check=False, capture_output=True, text=True, timeout=300
+            ["bash", "-c", script], check=False, capture_output=True, text=True, timeout=600
         )
         assert done.returncode == 0, done.stderr
         assert done.stderr == ""
@@ -133,14 +133,14 @@ def test_a_reader_that_has_had_enough_is_no_error(command):
 )
 def test_streams_that_are_closed_lead_nowhere(command, status):
     done = subprocess.run(
-        ["bash", "-c", f"{COMMAND} {command}"], check=False, capture_output=True, text=True, timeout=300
+        ["bash", "-c", f"{COMMAND} {command}"], check=False, capture_output=True, text=True, timeout=600
     )
     assert (done.stdout, done.stderr, done.returncode) == ("", "", status)
 
 
 def test_a_reader_of_messages_that_has_had_enough_is_no_traceback():
     script = f"{COMMAND} plot nowhere.json -o x.svg 2>&1 >/dev/null | true; echo ${{PIPESTATUS[0]}}"
-    done = subprocess.run(["bash", "-c", script], check=False, capture_output=True, text=True, timeout=300)
+    done = subprocess.run(["bash", "-c", script], check=False, capture_output=True, text=True, timeout=600)
     assert done.stdout == "2\n"
 
 

@@ -244,7 +244,7 @@ def test_a_second_run_into_one_folder_is_refused_until_the_first_has_ended(first
     ]
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as running:
         try:
-            until = time.monotonic() + 300
+            until = time.monotonic() + 600
             while not list(place.glob("out/*.mcap")):
                 assert time.monotonic() < until
                 assert running.poll() is None

@@ -57,7 +57,7 @@ def page(
     write_replay(path, tried, frames, Ending(End.DURATION, len(frames) - 1), {"rounds": 2}, marks)
     browser.set_window_size(1280, 800)
     browser.get(path.as_uri())
-    WebDriverWait(browser, 20).until(
+    WebDriverWait(browser, 600).until(
         lambda driver: driver.execute_script("return window.replay?.ready === true")
     )
     yield browser
@@ -79,7 +79,7 @@ def judged(
     write_replay(tmp_path / "judged.html", tried, frames, None, verdict=verdict(tried, BREACHES, 0))
     browser.set_window_size(1280, 800)
     browser.get((tmp_path / "judged.html").as_uri())
-    WebDriverWait(browser, 20).until(
+    WebDriverWait(browser, 600).until(
         lambda driver: driver.execute_script("return window.replay?.ready === true")
     )
     yield browser
@@ -108,7 +108,7 @@ def test_plays_pauses_and_stops_at_the_end(page: webdriver.Chrome) -> None:
     before = page.execute_script(PICTURE)
     assert ask(page, "playing") is False
     element(page, "play").click()
-    WebDriverWait(page, 10).until(lambda _: ask(page, "time") > 0.3)
+    WebDriverWait(page, 600).until(lambda _: ask(page, "time") > 0.3)
     assert ask(page, "playing") is True
     assert float(element(page, "slider").get_property("value")) > 0.0
     element(page, "play").click()
@@ -120,7 +120,7 @@ def test_plays_pauses_and_stops_at_the_end(page: webdriver.Chrome) -> None:
         "const s = document.getElementById('speed'); s.value = '16'; s.dispatchEvent(new Event('change'))"
     )
     page.execute_script("replay.seek(28); replay.play()")
-    WebDriverWait(page, 10).until(lambda _: ask(page, "playing") is False)
+    WebDriverWait(page, 600).until(lambda _: ask(page, "playing") is False)
     assert ask(page, "time") == 30.0
     assert ask(page, "frame") == 900
 
@@ -160,7 +160,7 @@ def test_between_frames_cars_move_evenly(page: webdriver.Chrome, trial: tuple[In
 
 def test_the_keyboard_does_it_all(page: webdriver.Chrome) -> None:
     press(page, Keys.SPACE)
-    WebDriverWait(page, 10).until(lambda _: ask(page, "playing") and ask(page, "time") > 0)
+    WebDriverWait(page, 600).until(lambda _: ask(page, "playing") and ask(page, "time") > 0)
     press(page, Keys.SPACE)
     assert ask(page, "playing") is False
     element(page, "play").click()

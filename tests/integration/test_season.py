@@ -143,7 +143,7 @@ def again(folder: Path, export: bytes, number: int) -> None:
         cwd=folder,
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=600,
         check=False,
     )
     assert ran.returncode == 0, ran.stderr

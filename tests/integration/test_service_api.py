@@ -88,7 +88,7 @@ def test_a_participant_at_a_terminal(service: Service, person: Person, tmp_path:
     def told(*arguments: str, status: int = 0) -> str:
         ran = subprocess.run(
             [*COMMAND, *arguments, "--token-file", str(tmp_path / "token")],
-            capture_output=True, text=True, cwd=tmp_path, timeout=240, check=False,
+            capture_output=True, text=True, cwd=tmp_path, timeout=600, check=False,
         )  # fmt: skip
         assert ran.returncode == status, ran.stderr
         return ran.stdout if "--json" in arguments else ran.stderr + ran.stdout
@@ -106,7 +106,7 @@ def test_a_participant_at_a_terminal(service: Service, person: Person, tmp_path:
     assert "no such submission" in told("status", f"{service.url}/s/9999", status=2)
     home = subprocess.run(
         [*COMMAND, "evaluate", str(entry), "--competition", phase, "--json", "--trust-submissions"],
-        capture_output=True, text=True, cwd=tmp_path, timeout=240, check=True,
+        capture_output=True, text=True, cwd=tmp_path, timeout=600, check=True,
     )  # fmt: skip
     assert json.loads(home.stdout)["trials"] == handed["trials"]
 

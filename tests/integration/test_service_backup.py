@@ -27,7 +27,7 @@ def test_what_was_backed_up_is_there_again(tmp_path: Path) -> None:
         organiser = service.organiser()
         person = service.person().join(organiser.invite(), "Ann", "Ants")
         number = person.submit("short/test", STANDING)
-        subprocess.run(["bash", "-e", "-c", found[1]], cwd=tmp_path, check=True, timeout=60)
+        subprocess.run(["bash", "-e", "-c", found[1]], cwd=tmp_path, check=True, timeout=600)
         commitment = organiser.get("/c/short/test/commitment.json").text
         assert person.submit("short/practice", STANDING) == number + 1
     shutil.rmtree(season)

@@ -70,7 +70,7 @@ def test_workers_killed_with_a_lease(tmp_path: Path, settings: str) -> None:
         for person, number in zip(people, numbers, strict=True):
             person.ended(number)
         survivor.terminate()
-        assert survivor.wait(timeout=60) == 0
+        assert survivor.wait(timeout=600) == 0
     counted_once(tmp_path, settings, TEAMS)
 
 
@@ -119,7 +119,7 @@ def test_told_to_end_it_gives_back_what_is_on_lease(tmp_path: Path) -> None:
         number = person.submit("short/practice", STANDING)
         wait_until(lambda: person.state(number) == "running", pause=0.02)
         service.process.terminate()
-        assert service.process.wait(timeout=60) == 0
+        assert service.process.wait(timeout=600) == 0
     database = database_of(tmp_path, SETTINGS)
     with database.reading() as session:
         assert "leased" not in set(session.scalars(select(Chunk.state)))

@@ -17,7 +17,7 @@ from tests.services import CRASHING, PASSWORD, STANDING, Service, competition_te
 
 AXE = Path(__file__).parents[1] / "vendor" / "axe.min.js"
 NASTY = "<img src=x onerror=window.broken=1>"
-WAIT_S = 120
+WAIT_S = 600
 PHONE, DESKTOP = (390, 844), (1280, 900)
 
 need_browser()
@@ -53,7 +53,7 @@ def login(browser: webdriver.Chrome, service: Service, name: str) -> None:
     browser.delete_all_cookies()
     browser.get(f"{service.url}/login")
     fill(browser, name=name, password=PASSWORD)
-    WebDriverWait(browser, 20).until(lambda _: browser.current_url == f"{service.url}/")
+    WebDriverWait(browser, WAIT_S).until(lambda _: browser.current_url == f"{service.url}/")
 
 
 def faults(browser: webdriver.Chrome) -> list[str]:
@@ -83,23 +83,27 @@ def test_a_participant_from_the_invitation_to_the_replay(
     browser.set_window_size(*DESKTOP)
     browser.get(f"{service.url}/join?code={organiser.invite()}")
     fill(browser, name=NASTY, password=PASSWORD, team=f"{NASTY} team")
-    WebDriverWait(browser, 20).until(lambda _: browser.current_url == f"{service.url}/")
+    WebDriverWait(browser, WAIT_S).until(lambda _: browser.current_url == f"{service.url}/")
     browser.get(f"{service.url}/c/short/practice")
     entry = tmp_path / "controller.py"
     entry.write_text(STANDING)
     browser.find_element(By.ID, "file").send_keys(str(entry))
     browser.find_element(By.XPATH, "//button[text()='Submit']").click()
-    WebDriverWait(browser, 20).until(lambda _: "/s/" in browser.current_url)
+    WebDriverWait(browser, WAIT_S).until(lambda _: "/s/" in browser.current_url)
     browser.execute_script("window.same = true")
     WebDriverWait(browser, WAIT_S).until(lambda _: browser.find_elements(By.CSS_SELECTOR, ".tag.done"))
     assert browser.execute_script("return window.same"), (
         "the page was loaded anew; htmx should have changed it"
     )
     browser.find_element(By.LINK_TEXT, "1").click()
-    frame = WebDriverWait(browser, 20).until(lambda _: browser.find_element(By.CSS_SELECTOR, "iframe.replay"))
+    frame = WebDriverWait(browser, WAIT_S).until(
+        lambda _: browser.find_element(By.CSS_SELECTOR, "iframe.replay")
+    )
     assert frame.get_attribute("sandbox") == "allow-scripts"
     browser.switch_to.frame(frame)
-    WebDriverWait(browser, 60).until(lambda _: browser.execute_script("return window.replay?.ready === true"))
+    WebDriverWait(browser, WAIT_S).until(
+        lambda _: browser.execute_script("return window.replay?.ready === true")
+    )
     with pytest.raises(Exception, match=r"(?i)cookie|denied|sandbox"):
         browser.execute_script("return document.cookie")
     browser.switch_to.default_content()
@@ -175,4 +179,4 @@ def test_the_keyboard_is_enough(browser: webdriver.Chrome, service: Service) -> 
     browser.switch_to.active_element.send_keys(Keys.TAB)
     assert browser.switch_to.active_element.get_attribute("id") == "name"
     browser.switch_to.active_element.send_keys("Olga", Keys.TAB, PASSWORD, Keys.ENTER)
-    WebDriverWait(browser, 20).until(lambda _: browser.find_elements(By.LINK_TEXT, "Desk"))
+    WebDriverWait(browser, WAIT_S).until(lambda _: browser.find_elements(By.LINK_TEXT, "Desk"))

@@ -45,13 +45,13 @@ def test_actors_and_a_node_are_killed(tmp_path: Path) -> None:
         left = people[0].submit("short/practice", f"{STANDING}\n# given back\n")
         wait_until(lambda: leased(tmp_path), pause=0.02)
         carrier.terminate()
-        assert carrier.wait(timeout=120) == 0, (tmp_path / "ray.log").read_text()
+        assert carrier.wait(timeout=600) == 0, (tmp_path / "ray.log").read_text()
         assert "a worker is lost" in (tmp_path / "ray.log").read_text()
         assert given_back(tmp_path)
         survivor = launched(service, token, "survivor", tmp_path)
         people[0].ended(left)
         survivor.terminate()
-        assert survivor.wait(timeout=60) == 0
+        assert survivor.wait(timeout=600) == 0
     counted_once(tmp_path, SETTINGS, TEAMS + 1)
 
 

@@ -64,7 +64,7 @@ def test_people_and_clients_come_by_https(tmp_path: Path) -> None:
             checked(url, service.code, ssl.create_default_context(cafile=str(tmp_path / "cert.pem")))
         finally:
             proxy.terminate()
-            proxy.wait(timeout=30)
+            proxy.wait(timeout=600)
 
 
 def checked(url: str, code: str, trusted: ssl.SSLContext) -> None:
@@ -74,7 +74,7 @@ def checked(url: str, code: str, trusted: ssl.SSLContext) -> None:
         except httpx.HTTPError:
             return False
 
-    wait_until(is_there, 60)
+    wait_until(is_there)
     organiser = Person(url, verify=trusted)
     organiser.join(code, "Olga")
     cookies = [

@@ -170,7 +170,7 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chro
 
 def test_the_search_works_from_a_file(site: Path, browser: webdriver.Chrome) -> None:
     browser.get(f"{(site / 'search.html').as_uri()}?q=overtaking")
-    WebDriverWait(browser, 300).until(
+    WebDriverWait(browser, 600).until(
         lambda page: page.find_elements(By.CSS_SELECTOR, "#search-results a[href*='rules.html']")
     )
 

@@ -78,10 +78,14 @@ def test_where_kernels_are_never_compiled_it_is_refused(monkeypatch) -> None:
 def test_ctrl_c_withdraws_what_is_asked_for(tmp_path: Path) -> None:
     around = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "DUBINS_TRAFFIC_KERNELS": "auto"}
     process = subprocess.Popen(WARM, env=around, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
-    while len(list(tmp_path.glob("*/asked-*/*.json"))) < 2:
-        assert process.poll() is None
-    process.send_signal(signal.SIGINT)
-    said = process.communicate()[1]
+    with process:
+        try:
+            while len(list(tmp_path.glob("*/asked-*/*.json"))) < 2:
+                assert process.poll() is None
+            process.send_signal(signal.SIGINT)
+            said = process.communicate(timeout=600)[1]
+        finally:
+            process.kill()
     assert process.returncode == 1
     assert "Traceback" not in said
     assert not list(tmp_path.glob("*/asked-*/*.json"))

@@ -1,6 +1,6 @@
-"""What boxes do where control groups are those of version 2; run under a kernel that has them: tests/user_mode.py.
+"""What boxes do where control groups are those of version 2; run under a kernel that has them: tests/guest.py.
 
-`python -m tests.sandbox.second_version NAME...` runs the attacks of these names, `all` every one; a kernel in user mode
+`python -m tests.sandbox.second_version NAME...` runs the attacks of these names, `all` every one; an emulated machine
 is slow, so they have more time than elsewhere.
 """
 
@@ -21,7 +21,7 @@ from dubins_traffic.sandbox.layers import CLOCK, MEMORY, PROCESSES, RLIMITS
 from dubins_traffic.sandbox.limits import Limits
 
 SLOW = 20.0
-SPIN = "i=0; while [ $i -lt 300000 ]; do i=$((i + 1)); done"
+SPIN = "i=0; while [ $i -lt 30000 ]; do i=$((i + 1)); done"
 
 
 def main(names: list[str]) -> int:

@@ -155,7 +155,7 @@ def test_a_kernel_that_forbids_namespaces_is_told_of_in_one_line() -> None:
         env={**os.environ, "PYTHONPATH": str(Path(dubins_traffic.__file__).parents[1])},
         capture_output=True,
         text=True,
-        timeout=300,
+        timeout=600,
         check=False,
     )
     assert done.returncode == 2, done.stderr

@@ -189,7 +189,7 @@ def test_a_program_in_cpp_with_threads_drives(tmp_path: Path) -> None:
         }
         """)
     )
-    subprocess.run(["g++", "-pthread", source, "-o", tmp_path / "drive"], check=True, timeout=300)
+    subprocess.run(["g++", "-pthread", source, "-o", tmp_path / "drive"], check=True, timeout=600)
     result, controller = driven(f"program:{tmp_path / 'drive'}")
     assert result.ending.end is End.DURATION, controller.end
 

@@ -96,7 +96,7 @@ def test_a_box_ends_with_its_worker() -> None:
         assert marked(mark) - {worker.pid}
         worker.send_signal(signal.SIGKILL)
         worker.wait()
-    waited = time.monotonic() + 300.0
+    waited = time.monotonic() + 600.0
     while marked(mark) and time.monotonic() < waited:
         time.sleep(0.05)
     assert marked(mark) == set()

@@ -8,10 +8,10 @@ import sys
 
 import pytest
 
-from tests import user_mode
+from tests import guest
 
 ATTACKS = os.environ.get("DUBINS_TRAFFIC_ATTACKS", "memory of many processes,processes").split(",")
-"""``all`` runs every attack, in a quarter of an hour."""
+"""``all`` runs every attack, for hours."""
 PLACES = {
     "root": (0, "/sys/fs/cgroup"),
     "beside": (0, "/sys/fs/cgroup/slice"),
@@ -22,9 +22,9 @@ PLACES = {
 
 @pytest.mark.parametrize("situation", sorted(PLACES) if ATTACKS == ["all"] else ["beside", "ordinary"])
 def test_the_second_version_holds(situation: str) -> None:
-    user_mode.require()
+    guest.require()
     user, place = PLACES[situation]
-    status, said = user_mode.run(
+    status, said = guest.run(
         [sys.executable, "-m", "tests.sandbox.second_version", *ATTACKS], situation, user=user
     )
     found = [json.loads(line) for line in said.splitlines() if line.startswith("{")]

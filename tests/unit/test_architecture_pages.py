@@ -76,7 +76,7 @@ def test_the_files_that_the_notes_name_exist() -> None:
 
 
 def test_the_pictures_show_the_layers_as_they_are(tmp_path: Path) -> None:
-    subprocess.run([sys.executable, PICTURES / "house.py", tmp_path], check=True, timeout=120)
+    subprocess.run([sys.executable, PICTURES / "house.py", tmp_path], check=True, timeout=600)
     shown = re.findall(r"\]\(pictures/house/([\w.]+)\)", page("architecture.md"))
     assert sorted(shown) == sorted(path.name for path in tmp_path.iterdir())
     for name in shown:

@@ -79,10 +79,10 @@ def test_what_is_too_large_to_be_put_together_is_said_to_be_late() -> None:
     large = " && ".join(f"[] (a -> <> b{i})" for i in range(11))
     texts = {"large": large, "delayed": "[] (a -> <>[5,10] c)", "small": "[] a && <> c"}
     names = ("a", "c", *(f"b{i}" for i in range(11)))
-    begun = time.perf_counter()
+    begun = time.process_time()
     monitors = Monitors({name: parse(text) for name, text in texts.items()}, names, 1 / 30)
     assert monitors.late == {"large", "delayed"}
-    assert time.perf_counter() - begun < 30
+    assert time.process_time() - begun < 30
     monitors.reset(1)
     monitors.update(np.ones((1, len(names))))
     assert monitors.verdicts[0].tolist() == [PRESUMABLY_TRUE, PRESUMABLY_FALSE, PRESUMABLY_TRUE]

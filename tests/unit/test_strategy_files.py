@@ -7,7 +7,7 @@ import json
 import tracemalloc
 import zipfile
 from pathlib import Path
-from time import perf_counter
+from time import process_time
 from typing import Any
 
 import numpy as np
@@ -105,7 +105,7 @@ def test_arrays_are_refused_by_the_size_that_they_claim(tmp_path: Path) -> None:
         with archive.open("rank_0.npy", "w", force_zip64=True) as stream:
             for _ in range(1 << 10):
                 stream.write(bytes(1 << 20))
-    begun = perf_counter()
+    begun = process_time()
     tracemalloc.start()
     with pytest.raises(InputError, match=r"bomb.npz: rank_0: too large: got '1073741824 bytes'"):
         Strategy.load(path)
@@ -120,4 +120,4 @@ def test_arrays_are_refused_by_the_size_that_they_claim(tmp_path: Path) -> None:
         InputError, match=r"rank_0: not an array of a strategy: got 'int32 .100000000000000,.'"
     ):
         Strategy.load(path)
-    assert perf_counter() - begun < 60.0
+    assert process_time() - begun < 60.0

@@ -277,19 +277,19 @@ def test_answers_that_are_there_are_not_asked_for_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("program", "fault"),
+    ("program", "seconds", "fault"),
     [
-        ("print('hello')", "no answer: printed 'hello'"),
-        ("print('{\"winning\": -1}')", "no answer"),
-        ("raise SystemExit('too hard')", "exit status 1: too hard"),
-        ("import time; time.sleep(60)", "no answer within 1 s"),
+        ("print('hello')", 600.0, "no answer: printed 'hello'"),
+        ("print('{\"winning\": -1}')", 600.0, "no answer"),
+        ("raise SystemExit('too hard')", 600.0, "exit status 1: too hard"),
+        ("import time; time.sleep(3600)", 1.0, "no answer within 1 s"),
     ],
 )
-def test_a_solver_without_an_answer_is_named(program: str, fault: str) -> None:
+def test_a_solver_without_an_answer_is_named(program: str, seconds: float, fault: str) -> None:
     entry = Suite.from_document(games()).model.games
     assert entry is not None
     found, _ = Solver(
-        "x", f'{sys.executable} -c "{program}" {{game}}'.replace('{"', r"{\"").replace('":', r"\":"), 1.0
+        "x", f'{sys.executable} -c "{program}" {{game}}'.replace('{"', r"{\"").replace('":', r"\":"), seconds
     ).solve(entry[0])
     assert found.fault is not None
     assert found.fault.startswith(fault)

@@ -24,7 +24,7 @@ SHOWN = re.findall(r"!\[[^\]]+\]\(pictures/([^)]+)\)", PAGE.read_text(encoding="
 @pytest.fixture(scope="module")
 def drawn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("pictures")
-    subprocess.run([sys.executable, PICTURES / "make.py", folder], check=True, timeout=120)
+    subprocess.run([sys.executable, PICTURES / "make.py", folder], check=True, timeout=600)
     return folder
 
 

@@ -27,7 +27,7 @@ from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import arc_factors, sincos
 from dubins_traffic.trial.buffer import all_finite
 
-PATIENCE = 300.0
+PATIENCE = 600.0
 
 
 def environment(cache: Path, tier: str) -> dict[str, str]:
@@ -42,9 +42,18 @@ def begin(cache: Path, code: str, tier: str = "auto") -> subprocess.Popen[str]:
 
 def python(cache: Path, code: str, tier: str = "auto") -> tuple[str, str]:
     process = begin(cache, code, tier)
-    told, said = process.communicate()
+    told, said = finished(process)
     assert process.returncode == 0, said
     return told, said
+
+
+def finished(process: subprocess.Popen[str]) -> tuple[str, str]:
+    """Return what a program has told and said when it has ended; end it if it does not."""
+    with process:
+        try:
+            return process.communicate(timeout=PATIENCE)
+        finally:
+            process.kill()
 
 
 def companions(cache: Path) -> list[int]:
@@ -127,7 +136,7 @@ def test_a_companion_killed_while_it_is_waited_for_is_begun_again(cache) -> None
     waiting = begin(cache, CALL, "compiled")
     until(lambda: companions(cache) or waiting.poll() is not None)
     end_companions(cache)
-    assert waiting.communicate() == (f"{sincos(0.5)}\n", "")
+    assert finished(waiting) == (f"{sincos(0.5)}\n", "")
 
 
 def test_a_companion_for_which_nobody_waits_leaves_processors_to_all_others(cache) -> None:
@@ -142,12 +151,12 @@ def test_a_companion_for_which_nobody_waits_leaves_processors_to_all_others(cach
     waiting = begin(cache, CALL, "compiled")
     until(lambda: companions(cache))
     assert [os.sched_getscheduler(process) for process in companions(cache)] == [os.SCHED_OTHER]
-    waiting.communicate()
+    finished(waiting)
 
 
 def test_processes_at_once_have_one_companion(cache) -> None:
     several = [begin(cache, CALL, "compiled") for _ in range(4)]
-    assert [process.communicate()[0] for process in several] == [f"{sincos(0.5)}\n"] * 4
+    assert [finished(process)[0] for process in several] == [f"{sincos(0.5)}\n"] * 4
     times = [path.stat().st_mtime_ns for path in kernels(cache)]
     assert len(times) == 1
     until(lambda: len(companions(cache)) <= 1)

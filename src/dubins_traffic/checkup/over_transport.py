@@ -153,9 +153,15 @@ def _start(words: Sequence[str], environment: Mapping[str, str]) -> subprocess.P
             stdin=subprocess.DEVNULL,
             stdout=ERRORS,
             start_new_session=True,
+            preexec_fn=_hear,  # noqa: PLW1509  # it takes no lock that a thread may hold
         )
     except OSError as error:
         raise _no_program(str(error), shlex.join(words)) from error
+
+
+def _hear() -> None:
+    """Let the program hear Ctrl-C, by which it is to end, also where this one ignores it, as behind nohup."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _dismiss(program: subprocess.Popen[bytes]) -> str:

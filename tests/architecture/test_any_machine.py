@@ -1,0 +1,50 @@
+"""Tests run on any processor, however they are begun: none asks for its model, children hear Ctrl-C, none runs on."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests import guest
+from tests.architecture.house import ROOT
+
+PLACES = ("tests", "scripts", "docs", ".ci", ".github", "Makefile", "pyproject.toml")
+OF_A_MODEL = re.compile(
+    r"linux\.uml|user-mode-linux|cpuinfo|lscpu|platform\.processor|cpu_(?:model|flags|name)|\b(?:avx|amx)\w*\b",
+    re.I,
+)
+"""What starts user-mode Linux, whose frame is too small for the registers of some models, or asks for the model."""
+WRITTEN = {".py", ".sh", ".md", ".toml", ".yml", ".cpp", ".c", ".hpp", ""}
+
+
+def written() -> list[Path]:
+    found = [path for place in PLACES for path in [ROOT / place, *(ROOT / place).rglob("*")]]
+    return [path for path in found if path.suffix in WRITTEN and path.is_file() and path != Path(__file__)]
+
+
+def test_nothing_starts_user_mode_linux_or_reads_the_model_of_the_processor() -> None:
+    assert len(written()) > 300
+    assert [str(path) for path in written() if OF_A_MODEL.search(path.read_text(encoding="utf-8"))] == []
+
+
+def test_a_kernel_of_its_own_runs_on_an_emulated_processor_that_is_always_the_same() -> None:
+    words = guest.MACHINE.split()
+    assert words[words.index("-accel") + 1] == "tcg"
+    assert words[words.index("-cpu") + 1] not in ("host", "max", "base")
+
+
+def test_programs_that_tests_start_hear_ctrl_c_wherever_the_tests_were_begun() -> None:
+    heard = "import signal; print(signal.getsignal(signal.SIGINT) is signal.default_int_handler)"
+    tests = f"import subprocess, sys, tests.conftest; subprocess.run([sys.executable, '-c', {heard!r}], check=True)"
+    deaf = ["sh", "-c", "trap '' INT; exec \"$@\"", "sh", sys.executable, "-c"]
+    for code, found in ((heard, "False\n"), (tests, "True\n")):
+        done = subprocess.run([*deaf, code], cwd=ROOT, capture_output=True, text=True, check=True)
+        assert done.stdout == found
+
+
+def test_every_test_has_a_limit_at_which_it_is_ended(pytestconfig: pytest.Config) -> None:
+    assert 0 < float(pytestconfig.getini("timeout")) <= 3600
