@@ -59,25 +59,32 @@ def require_no_scale(source: str | None, scale: float | None, w: float | None) -
             )
 
 
-def require_outputs(network: RoadNetwork | None, outputs: list[str] | None) -> None:
-    """Refuse files to which what was lost can't be written, before anything is: as `report` would."""
+def require_outputs(
+    network: RoadNetwork | None, outputs: list[str] | None, *others: str | None, overwrite: bool
+) -> None:
+    """Refuse files to which what was lost can't be written, before anything is: as `report` would.
+
+    `others` are what is read, and what else is written.
+    """
     if not outputs:
         return
 
-    from dubins_traffic.files import require_place
+    from dubins_traffic.problem.files import DOCUMENTS
     from dubins_traffic.viewer.plot import require_picture
 
     if _losses(network) is None:
         raise InputError(
             "nothing to tell", file="--losses", value=outputs[0], expected="a map of another program"
         )
-    for output in outputs:
-        if not _is_json(output):
-            require_picture(Path(output))
-        require_place(Path(output))
+    for number, output in enumerate(outputs):
+        apart_from = [*others, *outputs[:number]]
+        if _is_json(output):
+            options.require(output, "losses", DOCUMENTS, overwrite=overwrite, apart_from=apart_from)
+        else:
+            require_picture(output, overwrite=overwrite, apart_from=apart_from)
 
 
-def report(network: RoadNetwork | None, outputs: list[str] | None = None) -> None:
+def report(network: RoadNetwork | None, outputs: list[str] | None = None, *, overwrite: bool = False) -> None:
     """Tell on standard error what was lost of the map from which a network comes, and write it to files.
 
     Nothing is told of networks that come from no map of another program, and where there is none (None).
@@ -95,7 +102,7 @@ def report(network: RoadNetwork | None, outputs: list[str] | None = None) -> Non
         else:
             from dubins_traffic.viewer.losses import write_losses
 
-            write_losses(output, losses)
+            write_losses(output, losses, overwrite=overwrite)
         options.tell(output)
 
 
