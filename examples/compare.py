@@ -88,10 +88,10 @@ def compare(configuration: str, output: Path, controllers: Sequence[str], trials
             print(score.record)
     record = dt.load_record(next(iter(sheets.values())).trials[0].record or "")
     picture, page = output / "picture.png", output / "replay.html"
-    dt.write_plot(picture, record)
+    dt.write_plot(picture, record, overwrite=True)
     score = dt.score(record)
     summary = {heading.strip(): cell(score) for heading, cell in ROWS.items()}
-    dt.write_replay(page, record.instance, record.frames, record.ending, summary)
+    dt.write_replay(page, record.instance, record.frames, record.ending, summary, overwrite=True)
     print(f"{picture}  (trial {score.trial} of {score.controller})")
     print(f"{page}  (the same trial, to open in a browser)")
 

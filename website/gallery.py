@@ -53,7 +53,7 @@ def _replay(case: dict[str, Any], page: Path) -> None:
     with TemporaryDirectory() as folder:
         record = Path(folder) / "trial.mcap"
         result = dt.run_trial(instance, controller, record=record, deadline=deadline)
-        if main(["replay", str(record), "-o", str(page)]):
+        if main(["replay", str(record), "-o", str(page), "--overwrite"]):
             raise SystemExit(f"website/gallery.json: trial {case['name']} can't be replayed")
     if case["shows"] not in _shown(result, case["own"]):
         raise SystemExit(f"website/gallery.json: trial {case['name']} shows no {case['shows']}")

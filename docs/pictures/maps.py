@@ -29,15 +29,15 @@ def draw(source: Path, name: str) -> None:
     if not isinstance(form, ForeignFormat):
         raise SystemExit(f"{source}: not a map of another program")
     document, losses = form.reduced(text, str(source))
-    write_losses(HERE / f"{name}.svg", losses)
+    write_losses(HERE / f"{name}.svg", losses, overwrite=True)
     if source.parent == EXAMPLES:
-        write_plot(HERE / f"{name}-network.svg", RoadNetwork.from_document(document))
+        write_plot(HERE / f"{name}-network.svg", RoadNetwork.from_document(document), overwrite=True)
     print(name, *losses.lines(), sep="\n")
 
 
 def main() -> None:
     """Draw all."""
-    write_plot(HERE / "maps-bent.svg", generate(*BENT, bent=0.7))
+    write_plot(HERE / "maps-bent.svg", generate(*BENT, bent=0.7), overwrite=True)
     draw(EXAMPLES / "crossing.osm", "maps-crossing")
     for file, name in TOWNS.items():
         if len(sys.argv) > 1:

@@ -115,7 +115,7 @@ def train(name: str, folder: Path, generations: int | None = None) -> None:
         if generation % 10 == 0:
             print(f"{generation:4d} {found.mean():7.3f} {time.monotonic() - began:6.1f} s", flush=True)
     Policy(lesson.shown, CARS, SKIP, *[layer[0] for layer in lesson.layers(mean[None])]).save(
-        folder / f"{name}.npz"
+        folder / f"{name}.npz", overwrite=True
     )
     lines = ["generation,mean_return", *(f"{k},{value:.6f}" for k, value in enumerate(curve))]
     (folder / f"{name}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")

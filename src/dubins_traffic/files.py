@@ -12,7 +12,7 @@ import sys
 import tempfile
 import threading
 import zlib
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
 from dubins_traffic.errors import InputError
@@ -208,9 +208,69 @@ def require_place(path: Path) -> None:
     if path.is_dir():
         raise InputError("a folder", file=str(path), expected="a file to write")
     if not folder.is_dir():
-        raise InputError("no such folder", file=str(folder), expected="a folder to write to")
+        raise InputError("no such folder", file=str(path), value=str(folder), expected="a folder to write to")
     if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError("no permission to write", file=str(folder), expected="a folder to write to")
+        raise InputError("no permission to write", file=str(path), expected="a folder to write to")
+
+
+def require_output(
+    path: str | os.PathLike[str],
+    what: str,
+    suffixes: Sequence[str],
+    *,
+    overwrite: bool = False,
+    apart_from: Sequence[str | os.PathLike[str] | None] = (),
+) -> None:
+    """Refuse a path that a file of some kind may not be written to: the one rule for all that users have us write.
+
+    A device or a pipe may always be written to, it loses nothing. A file's name must end as such files do, and so must
+    the name of what it leads to, if it is a link. A file that is there is replaced only if `overwrite` is given, and
+    one that is read, or that is another output, never is, whatever it is called here.
+
+    Parameters
+    ----------
+    path : path
+        Where the file is to be written.
+    what : str
+        What it is to be, for the message.
+    suffixes : sequence of str
+        How names of such files end, in lower case.
+    overwrite : bool
+        Whether a file that is there may be replaced.
+    apart_from : sequence of path
+        What is read, and what else is written; None, and what names no file, is passed over.
+
+    Raises
+    ------
+    InputError
+        If it is refused, or as `require_place`.
+    """
+    target, name = Path(path), str(path)
+    if is_stream(target):
+        return
+    require_place(target)
+    for own in dict.fromkeys((target, Path(os.path.realpath(target)))):
+        if not own.name.lower().endswith(tuple(suffixes)):
+            value = own.suffix if own == target else f"a link to {own}"
+            expected = f"a name that ends in {', '.join(suffixes)}"
+            raise InputError(f"not a name of {what}", file=name, value=value, expected=expected)
+    for other in apart_from:
+        if other is not None and _is_same_file(target, Path(other)):
+            raise InputError("is read or written already", file=name, expected="another name")
+    if exists(target) and not overwrite:
+        raise InputError("exists already", file=name, expected="a new name, or --overwrite")
+
+
+def _is_same_file(one: Path, other: Path) -> bool:
+    """Tell whether two paths lead to one file, which need not be there yet."""
+    if exists(one) and exists(other):
+        return one.samefile(other)
+    return os.path.realpath(one) == os.path.realpath(other)
+
+
+def packed(*suffixes: str) -> tuple[str, ...]:
+    """Return suffixes, and the same of files that are packed by gzip, as `write_text` writes them."""
+    return (*suffixes, *(f"{suffix}{GZIP}" for suffix in suffixes))
 
 
 def make_folder(folder: Path, what: str) -> None:

@@ -176,7 +176,18 @@ def test_a_trial_is_the_instance_of_its_seed_and_number(run, place):
     ask = ["--controller", "mine.py:Straight", "--json"]
     sheet = scores(run("run", CONFIG, "--seed", "4", "--trials", "3", "--records", "a", *ask))
     for trial in range(3):
-        run("instance", CONFIG, "--seed", "4", "--trial", str(trial), "--full", "-o", "one.json")
+        run(
+            "instance",
+            CONFIG,
+            "--seed",
+            "4",
+            "--trial",
+            str(trial),
+            "--full",
+            "-o",
+            "one.json",
+            "--overwrite",
+        )
         alone = scores(run("run", "one.json", "--records", f"b{trial}", *ask))
         assert alone["trials"] == [sheet["trials"][trial]]
         name = f"trial-{trial:04d}.mcap"
@@ -263,7 +274,7 @@ def test_trial_data_are_those_of_2016(run, place):
 
 
 def test_another_network_for_a_configuration(run):
-    run("network", "--grid", "2", "2", "-o", "small.rnd")
+    run("network", "--grid", "2", "2", "--format", "text", "-o", "small.rnd")
     run("run", CONFIG, "--rnd", "small.rnd", "-f", "data.json", "--controller", "simple")
     assert TrialData.read("data.json").instances[0]["rnd"]["shape"] == [2, 2]
 

@@ -149,7 +149,7 @@ def test_commands_find_shrink_and_run_cases_again(tmp_path: Path, capsys: pytest
     case = str(next(files(folder)))
     assert main(["shrink", case, "-o", str(tmp_path / "missing" / "small.json")]) == 2
     told = capsys.readouterr().err
-    assert "missing: no such folder" in told
+    assert "small.json: no such folder" in told
     assert "without" not in told, "work was done that could not be kept"
     assert main(["shrink", case, "-o", str(tmp_path / "small.json")]) == 0
     assert "without having stopped" in capsys.readouterr().out

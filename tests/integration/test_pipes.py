@@ -211,7 +211,7 @@ def test_a_file_that_never_ends_is_refused(command, capsys):
     name, *rest = command.split(" ", 1)
     more = rest[0].split() if rest else []
     where = [more[0], "/dev/zero", *more[1:]] if more else ["/dev/zero"]
-    extra = ["-o", "x.out"] if name in ("plot", "replay") else []
+    extra = {"plot": ["-o", "x.png"], "replay": ["-o", "x.html"]}.get(name, [])
     assert main([name, *where, *extra]) == 2
     err = capsys.readouterr().err
     assert "/dev/zero" in err

@@ -34,7 +34,7 @@ def test_what_is_packed_is_read_and_written(name: str, tmp_path: Path) -> None:
     assert main(["convert", str(file), "-o", str(again)]) == 0
     assert gzip.decompress(again.read_bytes()).decode() == written(name)
     first = again.read_bytes()
-    GRID.write(again)
+    GRID.write(again, overwrite=True)
     assert again.read_bytes() == first
 
 

@@ -44,7 +44,7 @@ def test_files_that_are_no_strategies_are_refused(tmp_path: Path) -> None:
     np.savez(path, header=np.frombuffer(json.dumps(header).encode(), dtype=np.uint8))
     with pytest.raises(InputError, match=r"unknown version: got 99; expected 2"):
         Strategy.load(path)
-    Strategy.of(solved(2, 2, 1)).save(path)
+    Strategy.of(solved(2, 2, 1)).save(path, overwrite=True)
     path.write_bytes(path.read_bytes()[:-200])
     with pytest.raises(InputError, match="can't be read as a strategy"):
         Strategy.load(path)
@@ -52,7 +52,7 @@ def test_files_that_are_no_strategies_are_refused(tmp_path: Path) -> None:
 
 def saved(path: Path, **changes: Any) -> Path:
     """Write a strategy with other arrays, or with another header where `header` is a dict or a text."""
-    Strategy.of(solved(2, 2, 1)).save(path)
+    Strategy.of(solved(2, 2, 1)).save(path, overwrite=True)
     with np.load(path, allow_pickle=False) as archive:
         arrays = dict(archive)
     header = changes.pop("header", {})

@@ -129,6 +129,7 @@ def report(
             "--worst", metavar="K", min=0, max=100, help="Replays of the K worst trials of each controller."
         ),
     ] = 3,
+    overwrite: options.Replace = False,
     wall: Annotated[
         bool, typer.Option("--wall", help="Also what was measured on a wall clock, which does not repeat.")
     ] = False,
@@ -142,7 +143,7 @@ def report(
     from dubins_traffic.scoring.notice import assumption_notice
 
     with progress() as show:
-        written = write_report(folder, output, worst=worst, wall=wall, progress=show)
+        written = write_report(folder, output, worst=worst, wall=wall, progress=show, overwrite=overwrite)
     console = Console(highlight=False)
     for table in tables(written.comparison):
         console.print(table)
@@ -171,11 +172,12 @@ def replay(
             "--output", "-o", metavar="FILE.html", help="The page.", show_default="DIR/report/replays/..."
         ),
     ] = None,
+    overwrite: options.Replace = False,
 ) -> None:
     """Run one trial of a campaign again and make a page that replays it in a browser."""
     from dubins_traffic.campaign.report.write import replay_trial
 
-    page, note = replay_trial(folder, number, output)
+    page, note = replay_trial(folder, number, output, overwrite=overwrite)
     if note:
         faults.tell(f"trial {number} {note}")
     options.tell(str(page))

@@ -58,6 +58,7 @@ def convert(
     sdf: SdfOption = Sdf.CLASSIC,
     map_format: MapFormatOption = None,
     losses: maps.LossesOption = None,
+    overwrite: options.Replace = False,
 ) -> None:
     """Convert a road network (its suffix says to which map format) or a record (to `.csv`, `.parquet` or `.bag`).
 
@@ -80,40 +81,43 @@ def convert(
     from dubins_traffic.simulators.gazebo.export import Version, write_sdf
 
     if not is_stream(file) and (is_bag(file) or is_log(file)):
-        _to_records(file, output)
+        _to_records(file, output, overwrite=overwrite)
         return
     form = None if map_format is None else formats.load(map_format)
-    with maps.telling(losses):
+    options.require(output, "an output", ("",), overwrite=overwrite, apart_from=[file])
+    with maps.telling(losses, file, output, overwrite=overwrite):
         found = load(file, map_format=form)
-    maps.require_outputs(found if isinstance(found, RoadNetwork) else None, losses)
+    network = found if isinstance(found, RoadNetwork) else None
+    maps.require_outputs(network, losses, file, output, overwrite=overwrite)
     suffix = Path(output).suffix.lower()
     if suffix == WORLD and isinstance(found, RoadNetwork | Instance | Record):
-        write_sdf(found.instance if isinstance(found, Record) else found, output, Version(sdf.value))
+        what = found.instance if isinstance(found, Record) else found
+        write_sdf(what, output, Version(sdf.value), overwrite=overwrite)
     elif isinstance(found, Record) and suffix == ".bag":
-        options.tell(output, str(write_bag(found, output)))
+        options.tell(output, str(write_bag(found, output, overwrite=overwrite)))
         return
     elif isinstance(found, Record):
-        export(found, output)
+        export(found, output, overwrite=overwrite)
     elif isinstance(found, RoadNetwork):
         if formats.of_suffix(output, form) is None:
             expected = f"a suffix of {', '.join((*formats.suffixes(form), WORLD))}"
             raise InputError(
                 "not a container of road networks", file=output, value=Path(output).suffix, expected=expected
             )
-        found.write(output, form)
-        maps.report(found, losses)
+        found.write(output, form, overwrite=overwrite)
+        maps.report(found, losses, overwrite=overwrite)
     else:
         raise InputError("can't be converted", file=file, expected="a road network or a record")
     options.tell(output)
 
 
-def _to_records(file: str, output: str) -> None:
+def _to_records(file: str, output: str, *, overwrite: bool) -> None:
     """Write the trials of a bag or log as records."""
     from dubins_traffic.interchange.bag_reader import bag_to_records, is_bag
     from dubins_traffic.interchange.lcm_log import log_to_records
+    from dubins_traffic.record.writer import SUFFIX
 
-    if Path(output).suffix.lower() != ".mcap":
-        raise InputError("not a record", file=output, value=Path(output).suffix, expected="the suffix .mcap")
-    records = (bag_to_records if is_bag(file) else log_to_records)(file, output, overwrite=True)
+    options.require(output, "a record", (SUFFIX,), overwrite=overwrite, apart_from=[file])
+    records = (bag_to_records if is_bag(file) else log_to_records)(file, output, overwrite=overwrite)
     count = [f"{len(records)} trials, {len(records)} records:"] if len(records) > 1 else []
     options.tell(*count, *map(str, records))

@@ -163,26 +163,27 @@ def shrink(
             "--output", "-o", metavar="FILE.json", help="The small case.", show_default="CASE.small.json"
         ),
     ] = None,
+    overwrite: options.Replace = False,
     over: OverOption = None,
     shield: options.Shield = False,
 ) -> None:
     """Take away from a case what its failure does not need; write what is left, with its replay page."""
-    from pathlib import Path
-
     from dubins_traffic.falsification.pages import write_page
     from dubins_traffic.falsification.shrink import shrink as smaller
-    from dubins_traffic.files import require_place
+    from dubins_traffic.problem.files import DOCUMENTS
+    from dubins_traffic.viewer.replay import PAGES
 
     target = output or options.beside(case, ".small.json")
-    require_place(Path(target))
     page = options.beside(target, ".html")
+    options.require(target, "a case", DOCUMENTS, overwrite=overwrite, apart_from=[case])
+    options.require(page, "a page", PAGES, overwrite=overwrite)
     with contextlib.ExitStack() as held:
         driver: str | Remote | None = None
         if controller is not None or over is not None:
             driver = held.enter_context(driven(controller or "", over, shield=shield))
         found = smaller(case, driver, progress=lambda what: faults.tell(f"without {what}"))
-        found.write(target)
-        write_page(found, page, driver)
+        found.write(target, overwrite=overwrite)
+        write_page(found, page, driver, overwrite=overwrite)
     print(found.story.sentence)
     options.tell(target, page)
 

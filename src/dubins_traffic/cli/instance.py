@@ -26,13 +26,15 @@ def instance(
         typer.Option("--full", help="Version 1, with starts, duration, e-agents and seed: it can be run."),
     ] = False,
     output: options.Output = None,
+    overwrite: options.Replace = False,
 ) -> None:
     """Print the problem instance that trial I of a configuration has: version 0, what a controller is told."""
     from dubins_traffic.problem.configuration import load_config
     from dubins_traffic.problem.document import instance_to_document
     from dubins_traffic.problem.draw import draw
-    from dubins_traffic.problem.files import dumps
+    from dubins_traffic.problem.files import DOCUMENTS, dumps
 
+    options.require(output, "an instance", DOCUMENTS, overwrite=overwrite, apart_from=[config])
     configuration = load_config(config)
     maps.report(configuration.network)
     drawn = draw(configuration, seed, trial)

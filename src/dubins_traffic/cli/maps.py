@@ -62,48 +62,58 @@ def require_no_scale(source: str | None, scale: float | None, w: float | None) -
 
 
 @contextmanager
-def telling(outputs: list[str] | None) -> Generator[None]:
-    """Tell what was lost, and write it to files, also where nothing of a map can be held, which is then refused."""
+def telling(outputs: list[str] | None, *others: str | None, overwrite: bool) -> Generator[None]:
+    """Tell what was lost, and write it to files, also where nothing of a map can be held, which is then refused.
+
+    `others` are what is read, and what else is written.
+    """
     from dubins_traffic.roads.maps.losses import NothingHeldError
 
     try:
         yield
     except NothingHeldError as error:
-        _require(outputs or [])
-        _tell(error.losses, outputs or [])
+        _require(outputs or [], *others, overwrite=overwrite)
+        _tell(error.losses, outputs or [], overwrite=overwrite)
         raise
 
 
-def require_outputs(network: RoadNetwork | None, outputs: list[str] | None) -> None:
-    """Refuse files to which what was lost can't be written, before anything is: as `report` would."""
+def require_outputs(
+    network: RoadNetwork | None, outputs: list[str] | None, *others: str | None, overwrite: bool
+) -> None:
+    """Refuse files to which what was lost can't be written, before anything is: as `report` would.
+
+    `others` are what is read, and what else is written.
+    """
     if outputs and _losses(network) is None:
         raise InputError(
             "nothing to tell", file="--losses", value=outputs[0], expected="a map of another program"
         )
-    _require(outputs or [])
+    _require(outputs or [], *others, overwrite=overwrite)
 
 
-def _require(outputs: list[str]) -> None:
-    from dubins_traffic.files import require_place
+def _require(outputs: list[str], *others: str | None, overwrite: bool) -> None:
+    from dubins_traffic.problem.files import DOCUMENTS
     from dubins_traffic.viewer.plot import require_picture
 
-    for output in outputs:
-        if not _is_json(output):
-            require_picture(Path(output))
-        require_place(Path(output))
+    for number, output in enumerate(outputs):
+        apart_from = [*others, *outputs[:number]]
+        if _is_json(output):
+            options.require(output, "losses", DOCUMENTS, overwrite=overwrite, apart_from=apart_from)
+        else:
+            require_picture(output, overwrite=overwrite, apart_from=apart_from)
 
 
-def report(network: RoadNetwork | None, outputs: list[str] | None = None) -> None:
+def report(network: RoadNetwork | None, outputs: list[str] | None = None, *, overwrite: bool = False) -> None:
     """Tell on standard error what was lost of the map from which a network comes, and write it to files.
 
     Nothing is told of networks that come from no map of another program, and where there is none (None).
     """
     losses = _losses(network)
     if losses is not None:
-        _tell(losses, outputs or [])
+        _tell(losses, outputs or [], overwrite=overwrite)
 
 
-def _tell(losses: Losses, outputs: list[str]) -> None:
+def _tell(losses: Losses, outputs: list[str], *, overwrite: bool) -> None:
     from dubins_traffic.files import write_text
 
     for line in losses.lines():
@@ -114,7 +124,7 @@ def _tell(losses: Losses, outputs: list[str]) -> None:
         else:
             from dubins_traffic.viewer.losses import write_losses
 
-            write_losses(output, losses)
+            write_losses(output, losses, overwrite=overwrite)
         options.tell(output)
 
 

@@ -26,9 +26,10 @@ def ros1(
     options.tell(str(folder))
 
 
-def lcm(output: options.Output = None) -> None:
+def lcm(output: options.Output = None, overwrite: options.Replace = False) -> None:
     """Print the definitions of the messages, from which lcm-gen makes code for C, C++, Java, Lua, Go, ..."""
     from importlib.resources import files
 
+    options.require(output, "definitions", (".lcm",), overwrite=overwrite)
     definitions = files("dubins_traffic.transports.lcm") / "dubins_traffic_lcm.lcm"
     options.write(definitions.read_text(encoding="utf-8"), output)

@@ -25,6 +25,10 @@ class Format(StrEnum):
     TEXT = "text"
 
 
+SUFFIXES = {Format.JSON: (".json",), Format.TEXT: (".rnd", ".txt")}
+"""How names of files with these containers end."""
+
+
 IntersectionsOption = Annotated[
     int | None,
     typer.Option("--intersections", metavar="N", help="Draw a random network of N intersections"),
@@ -90,11 +94,15 @@ def network(
     seed: options.Seed = 0,
     format: Annotated[Format, typer.Option("--format", help="Container of the network.")] = Format.JSON,
     output: options.Output = None,
+    overwrite: options.Replace = False,
 ) -> None:
     """Print a road network: a grid, one drawn at random, or what can be held of a map (docs/maps.md)."""
+    from dubins_traffic.files import packed
     from dubins_traffic.roads.generate import generate
     from dubins_traffic.roads.network import RoadNetwork
 
+    suffixes = packed(*SUFFIXES[format])
+    options.require(output, "a road network", suffixes, overwrite=overwrite, apart_from=[source])
     if source is None:
         maps.require_no_scale(None, scale, w)
     if source is not None:
@@ -102,7 +110,7 @@ def network(
             raise InputError(
                 "two networks at once", file="--from", value=source, expected="nothing else beside it"
             )
-        with maps.telling(losses):
+        with maps.telling(losses, source, output, overwrite=overwrite):
             made = maps.imported(source, scale, w, tolerance)
     elif intersections is None and segments is None:
         rows, columns = grid or (3, 4)
@@ -116,6 +124,6 @@ def network(
         raise InputError("missing", file=missing, expected="both --intersections and --segments")
     else:
         made = generate(intersections, segments, seed, bent=bent)
-    maps.require_outputs(made, losses)
+    maps.require_outputs(made, losses, source, output, overwrite=overwrite)
     options.write(made.to_json() if format is Format.JSON else made.to_text(), output)
-    maps.report(made, losses)
+    maps.report(made, losses, overwrite=overwrite)

@@ -75,6 +75,7 @@ Output = Annotated[
     str | None,
     typer.Option("--output", "-o", metavar="FILE", help="Write here instead of to standard output."),
 ]
+Replace = Annotated[bool, typer.Option("--overwrite", help="Replace what is there; else it is refused.")]
 Shield = Annotated[
     bool,
     typer.Option(
@@ -194,6 +195,22 @@ def trial_data(data: str | None, data_over: str | None) -> str | None:
     if data is not None and data_over is not None:
         raise InputError("two trial data files", file="-F", value=data_over, expected="either -f or -F")
     return data_over if data is None else data
+
+
+def require(
+    output: str | None,
+    what: str,
+    suffixes: Sequence[str],
+    *,
+    overwrite: bool,
+    apart_from: Sequence[str | None] = (),
+) -> None:
+    """Refuse an output as `files.require_output` does; standard output never is."""
+    if output is None or output == "-":
+        return
+    from dubins_traffic.files import require_output
+
+    require_output(output, what, suffixes, overwrite=overwrite, apart_from=apart_from)
 
 
 def write(text: str, output: str | None) -> None:

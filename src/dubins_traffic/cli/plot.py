@@ -33,16 +33,18 @@ def plot(
             show_default="FILE.png",
         ),
     ] = None,
+    overwrite: options.Replace = False,
 ) -> None:
     """Draw a network, an instance or a recorded trial."""
     from dubins_traffic.problem.configuration import Configuration
     from dubins_traffic.runs.sources import load
-    from dubins_traffic.viewer.plot import write_plot
+    from dubins_traffic.viewer.plot import require_picture, write_plot
 
     output = output or options.beside(file, ".png")
+    require_picture(output, overwrite=overwrite, apart_from=[file])
     subject = load(file)
     if isinstance(subject, Configuration):
         expected = "a network, an instance or a record; `dubins-traffic instance CONFIG` draws an instance"
         raise InputError("a configuration can't be drawn", file=file, expected=expected)
-    write_plot(output, subject)
+    write_plot(output, subject, overwrite=overwrite)
     options.tell(output)

@@ -17,15 +17,17 @@ def replay(
         str | None,
         typer.Option("--output", "-o", metavar="FILE.html", help="The page.", show_default="RECORD.html"),
     ] = None,
+    overwrite: options.Replace = False,
 ) -> None:
     """Make one self-contained page that replays a trial in a browser: play, pause, scrub, speed, trails."""
     from dubins_traffic.cli.tables import summary
     from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.score import score
     from dubins_traffic.viewer.marks import formula_marks
-    from dubins_traffic.viewer.replay import write_replay
+    from dubins_traffic.viewer.replay import PAGES, write_replay
 
     output = output or options.beside(record, ".html")
+    options.require(output, "a page", PAGES, overwrite=overwrite, apart_from=[record])
     found = load_record(record)
     scored = score(found)
     write_replay(
@@ -36,5 +38,6 @@ def replay(
         summary(scored),
         formula_marks(scored.formulas),
         scored.verdict,
+        overwrite=overwrite,
     )
     options.tell(output)

@@ -38,6 +38,14 @@ class Format(StrEnum):
     LATEX = "latex"
 
 
+SUFFIXES = {
+    Format.TLSF: (".tlsf",),
+    Format.SLUGS: (".structuredslugs",),
+    Format.TULIP: (".py",),
+    Format.LATEX: (".tex",),
+}
+"""How names of files in a language end; in the others, as `PLAIN`."""
+PLAIN = (".txt", ".ltl", ".stl")
 ONE_FORMULA = (Format.SPIN, Format.SPOT, Format.STL)
 """Formats that have no place of their own for assumptions."""
 
@@ -67,12 +75,15 @@ def spec(
         ),
     ] = None,
     output: options.Output = None,
+    overwrite: options.Replace = False,
 ) -> None:
     """Print the task of a problem as temporal logic: what is assumed of the others, and what the ego guarantees."""
     from dubins_traffic.rules.task import task
 
     if period is not None and not 0.0 < period < math.inf:
         raise InputError("not a period", field="--period", value=period, expected="seconds > 0")
+    suffixes = PLAIN if format is None else SUFFIXES.get(format, PLAIN)
+    options.require(output, "a specification", suffixes, overwrite=overwrite, apart_from=[instance])
     found = _instance(instance)
     try:
         whole = task(found.problem, found.names)

@@ -157,7 +157,7 @@ def run(
     else:
         path = _trials(found, Path(folder), controllers or [], trials, workers, resume=resume)
     report = Path(folder) / "report"
-    print(write_results(found, open_sources([str(path)]), report), end="")
+    print(write_results(found, open_sources([str(path)]), report, overwrite=True), end="")
     options.tell(str(path), str(report / PAGE))
     if found.model.cases is not None:
         faults.fail_if(cases.faulty(Path(folder), found))
@@ -252,6 +252,7 @@ def compare(
         str | None,
         typer.Option("--output", "-o", metavar="FOLDER", help="Write the page, the table and CSV there."),
     ] = None,
+    overwrite: options.Replace = False,
     name: Annotated[
         str | None,
         typer.Option("--suite", metavar="FILE", help="The suite's file, if the suite is not shipped."),
@@ -271,7 +272,7 @@ def compare(
     if output is None:
         print(results(found, sources)[TABLE], end="")
     else:
-        print(write_results(found, sources, Path(output)), end="")
+        print(write_results(found, sources, Path(output), overwrite=overwrite), end="")
         options.tell(str(Path(output) / PAGE))
     if len({source.found.code for source in sources}) > 1:
         faults.tell(made_by(sources))

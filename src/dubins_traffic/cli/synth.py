@@ -73,9 +73,6 @@ SpecOption = Annotated[
         help="Write the game as a specification: `*.structuredslugs`, `*.tlsf`, or `*.py` for TuLiP.",
     ),
 ]
-OverwriteOption = Annotated[
-    bool, typer.Option("--overwrite", help="Replace files that exist; else they are refused.")
-]
 ExplainOption = Annotated[
     bool, typer.Option("--explain", help="Say why, and what to assume if the ego does not win.")
 ]
@@ -98,7 +95,7 @@ def synth(
     strategy: StrategyOption = None,
     graph: GraphOption = None,
     spec: SpecOption = None,
-    overwrite: OverwriteOption = False,
+    overwrite: options.Replace = False,
     explain: ExplainOption = False,
     memory: MemoryOption = None,
     seed: options.Seed = 0,
@@ -111,18 +108,13 @@ def synth(
     """
     from dubins_traffic.files import write_text
     from dubins_traffic.synthesis.answer import answer
-    from dubins_traffic.synthesis.archive import check_target
     from dubins_traffic.synthesis.checker import check
     from dubins_traffic.synthesis.export import save_game
     from dubins_traffic.synthesis.instance import start_cells
     from dubins_traffic.synthesis.specification import specification_text
     from dubins_traffic.synthesis.strategy import Strategy
 
-    for option, name in (("--output", strategy), ("--graph", graph)):
-        if name is not None:
-            _check_archive(option, name, overwrite=overwrite)
-    if spec is not None:
-        check_target(spec, overwrite=overwrite)
+    _check_outputs(source, strategy, graph, spec, overwrite=overwrite)
     instance = _instance(source, seed, trial)
     with _progress() as progress:
         found = answer(
@@ -135,7 +127,7 @@ def synth(
         )
         reasons = found.explain(progress) if explain else []
     if graph is not None:
-        save_game(found.solution.game, graph)
+        save_game(found.solution.game, graph, overwrite=overwrite)
     if spec is not None:
         board = found.solution.game.board
         write_text(spec, specification_text(board, start_cells(board, instance), Path(spec).suffix))
@@ -143,7 +135,7 @@ def synth(
         won = Strategy.of(found.solution)
         won.first()
         check(found.solution.game, won.ranks)
-        won.save(strategy)
+        won.save(strategy, overwrite=overwrite)
     if json:
         extra = {"explanation": reasons} if explain else {}
         print(json_text.dumps(found.to_json() | extra, indent=2))
@@ -158,13 +150,16 @@ def _parsed(assume: str) -> Assumption:
     return Assumption.parse([word for word in assume.split(",") if word.strip() != "nothing"])
 
 
-def _check_archive(option: str, name: str, *, overwrite: bool) -> None:
-    """Raise InputError if no archive of that name can be written."""
-    from dubins_traffic.synthesis.archive import check_target
+def _check_outputs(
+    source: str, strategy: str | None, graph: str | None, spec: str | None, *, overwrite: bool
+) -> None:
+    """Refuse outputs that can't be written, before the game is solved."""
+    from dubins_traffic.synthesis.archive import ARCHIVE, SUFFIXES
+    from dubins_traffic.synthesis.specification import FORMS
 
-    if not name.endswith(".npz"):
-        raise InputError("not a name of an archive", field=option, value=name, expected="NAME.npz")
-    check_target(name, overwrite=overwrite)
+    options.require(strategy, ARCHIVE, SUFFIXES, overwrite=overwrite, apart_from=[source])
+    options.require(graph, ARCHIVE, SUFFIXES, overwrite=overwrite, apart_from=[source, strategy])
+    options.require(spec, "a specification", tuple(FORMS), overwrite=overwrite, apart_from=[source])
 
 
 def _instance(source: str, seed: int, trial: int) -> Instance:

@@ -70,8 +70,9 @@ class Policy:
         """Return the action, shares (-1 to 1) of the largest speed and yaw rate, (2,), for the input `seen`, (V,)."""
         return np.tanh(self.out @ np.tanh(self.hidden @ seen + self.hidden_bias) + self.out_bias)
 
-    def save(self, path: str | Path) -> None:
-        """Write the policy to a file."""
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the policy to a file `*.npz`; InputError as of `files.require_output`."""
+        files.require_output(path, "a policy", (".npz",), overwrite=overwrite)
         arrays: dict[str, Any] = {name: np.asarray(getattr(self, name)) for name in _ARRAYS}
 
         def write(neighbour: Path) -> None:

@@ -40,7 +40,7 @@ class Archive:
     def keep(self, name: str, case: Case) -> Path:
         """Write a case under a name, and return its file."""
         path = self.folder / CASES / f"{name}.json"
-        case.write(path)
+        case.write(path, overwrite=True)
         self.cases[name] = case
         return path
 

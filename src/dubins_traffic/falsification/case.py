@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Final, cast, get_type_hints
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.cells import Cell, Manoeuvre
-from dubins_traffic.files import read_text, write_text
+from dubins_traffic.files import read_text, require_output, write_text
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
-from dubins_traffic.problem.files import parse_json
+from dubins_traffic.problem.files import DOCUMENTS, parse_json
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -60,8 +60,9 @@ class Case:
             + "\n}\n"
         )
 
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write its file, whole or not at all."""
+    def write(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+        """Write its file, whole or not at all; InputError as of `files.require_output`."""
+        require_output(path, "a case", DOCUMENTS, overwrite=overwrite)
         write_text(Path(path), self.to_text())
 
 

@@ -15,7 +15,13 @@ if TYPE_CHECKING:
     from dubins_traffic.falsification.remote import Remote
 
 
-def write_page(case: Case, path: str | os.PathLike[str], controller: str | Remote | None = None) -> None:
+def write_page(
+    case: Case,
+    path: str | os.PathLike[str],
+    controller: str | Remote | None = None,
+    *,
+    overwrite: bool = False,
+) -> None:
     """Write the page that replays a case, driven by its controller or another; equal cases give equal bytes."""
     driver = case.story.controller if controller is None else controller
     name = name_of(driver)
@@ -28,4 +34,6 @@ def write_page(case: Case, path: str | os.PathLike[str], controller: str | Remot
         "controller": name,
         "broken by the ego": ", ".join(dict.fromkeys(own)) or "nothing",
     }
-    write_replay(path, record.instance, record.frames, record.ending, summary, (), verdict)
+    write_replay(
+        path, record.instance, record.frames, record.ending, summary, (), verdict, overwrite=overwrite
+    )

@@ -22,7 +22,7 @@ from dubins_traffic.problem.files import parse_json
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import End, Ending, Sink
-from dubins_traffic.record.writer import RecordWriter
+from dubins_traffic.record.writer import RecordWriter, record_paths
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.transports.quaternion import heading
 from dubins_traffic.transports.ros1.transport import COMMANDS
@@ -119,18 +119,16 @@ def bag_to_records(path: Path | str, output: Path | str, *, overwrite: bool = Fa
         raise InputError("no problem instance", file=name, expected=f"a message on {PROBLEM}")
     if "ego" not in bag.poses:
         raise InputError("no poses of the ego", file=name, expected=f"messages on {STATES}")
-    written: list[Path] = []
-    for number, run in enumerate(bag.runs):
+    records = record_paths(output, len(bag.runs), overwrite=overwrite)
+    for number, (run, record) in enumerate(zip(bag.runs, records, strict=True)):
         instance = _instance(bag, run, number, name)
         controller = next((note["controller"] for note in run.notes if "controller" in note), None)
-        record = output.with_stem(f"{output.stem}-{number}") if number else output
         writer = RecordWriter(record, controller=controller, overwrite=overwrite)
         try:
             _replay(bag, run, instance, writer)
         finally:
             writer.close()
-        written.append(record)
-    return written
+    return records
 
 
 def _read(path: Path) -> _Bag:

@@ -17,9 +17,10 @@ import numpy as np
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.errors import MissingExtraError
-from dubins_traffic.files import replace_file
+from dubins_traffic.files import replace_file, require_output
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.document import instance_to_document
+from dubins_traffic.problem.files import DOCUMENTS
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.record.reader import Record
@@ -64,7 +65,7 @@ def trial_data_path(bag: Path | str) -> Path:
     return Path(bag).with_suffix(".trial.json")
 
 
-def write_bag(record: Record, path: Path | str) -> Path:
+def write_bag(record: Record, path: Path | str, *, overwrite: bool = False) -> Path:
     """Write `record` as a bag, and its trial data beside it; return where those are.
 
     Raises
@@ -72,12 +73,14 @@ def write_bag(record: Record, path: Path | str) -> Path:
     MissingExtraError
         Without the extra `ros1`.
     InputError
-        If a file can't be written.
+        If a path is refused (`files.require_output`), or a file can't be written.
     """
+    require_output(path, "a bag", (".bag",), overwrite=overwrite)
     data = trial_data_path(path)
+    require_output(data, "trial data", DOCUMENTS, overwrite=overwrite)
     store = typestore()
     replace_file(Path(path), lambda neighbour: _Bag(record, store).write(neighbour))
-    trial_data(record).write(data)
+    trial_data(record).write(data, overwrite=overwrite)
     return data
 
 

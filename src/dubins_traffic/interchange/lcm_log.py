@@ -17,7 +17,7 @@ from dubins_traffic.files import begins_with
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import End, Ending, Sink
-from dubins_traffic.record.writer import RecordWriter
+from dubins_traffic.record.writer import RecordWriter, record_paths
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.transports.lcm import connection
 from dubins_traffic.transports.lcm.dubins_traffic_lcm import car_t, end_t, instance_t, world_t
@@ -90,7 +90,8 @@ def log_to_records(path: Path | str, output: Path | str, *, overwrite: bool = Fa
         raise InputError("no trial", file=name, expected=f"a message on {connection.INSTANCE}, then frames")
     written: list[Path] = []
     broken: list[InputError] = []
-    for number, trial in enumerate(trials):
+    records = record_paths(output, len(trials), overwrite=overwrite)
+    for number, (trial, record) in enumerate(zip(trials, records, strict=True)):
         ticks = trial.ticks
         if ticks < 1 or ticks + 1 < len(trial.cars):
             lost = f"tick {ticks + 1} of trial {number}"
@@ -100,7 +101,6 @@ def log_to_records(path: Path | str, output: Path | str, *, overwrite: bool = Fa
                 )
             )
             continue
-        record = output.with_stem(f"{output.stem}-{number}") if number else output
         _write(trial, number, ticks, record, overwrite=overwrite)
         written.append(record)
     if broken:

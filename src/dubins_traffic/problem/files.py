@@ -13,11 +13,13 @@ from pathlib import Path
 from typing import Any, cast
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import decoded, is_stream, read_bytes, write_text
+from dubins_traffic.files import decoded, is_stream, packed, read_bytes, require_output, write_text
 from dubins_traffic.roads.formats.registry import is_map
 
 STANDARD_INPUT = "-"
 MCAP_MAGIC = b"\x89MCAP0\r\n"
+DOCUMENTS = packed(".json")
+"""How names of the files of documents end."""
 _DEEPEST = 100
 
 
@@ -140,8 +142,17 @@ def dumps(document: Mapping[str, Any]) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def write_document(document: Mapping[str, Any], path: str | os.PathLike[str]) -> None:
-    """Write a JSON object to `path`, whole or not at all; InputError if that can't be done."""
+def write_document(
+    document: Mapping[str, Any], path: str | os.PathLike[str], *, overwrite: bool = False
+) -> None:
+    """Write a JSON object to `path`, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the path is refused (`files.require_output`), or the file can't be written.
+    """
+    require_output(path, "a document", DOCUMENTS, overwrite=overwrite)
     write_text(os.fspath(path), dumps(document))
 
 

@@ -124,6 +124,6 @@ class TrialData:
             **self.extra,
         }
 
-    def write(self, path: str | os.PathLike[str]) -> None:
-        """Write the file, whole or not at all; InputError if that can't be done."""
-        write_document(self.to_document(), path)
+    def write(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
+        """Write the file, as `write_document` does."""
+        write_document(self.to_document(), path, overwrite=overwrite)

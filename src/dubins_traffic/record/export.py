@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.errors import InputError, MissingExtraError
-from dubins_traffic.files import replace_file
+from dubins_traffic.files import replace_file, require_output
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.reader import Record
 
@@ -33,14 +33,15 @@ def table(record: Record) -> dict[str, Any]:
     return columns
 
 
-def write_csv(record: Record, path: Path | str) -> None:
+def write_csv(record: Record, path: Path | str, *, overwrite: bool = False) -> None:
     """Write a record as CSV, lines ended by LF; floats read back to the same bits.
 
     Raises
     ------
     InputError
-        If the file can't be written; nothing is left behind.
+        If `path` is refused (`files.require_output`), or the file can't be written; nothing is left behind.
     """
+    require_output(path, "a table", (".csv",), overwrite=overwrite)
     columns = table(record)
     columns["car"] = [_quoted(name) for name in columns["car"]]
     cells = [columns[name] if name == "car" else _texts(columns[name]) for name in COLUMNS]
@@ -49,7 +50,7 @@ def write_csv(record: Record, path: Path | str) -> None:
     replace_file(Path(path), lambda neighbour: neighbour.write_bytes(text))
 
 
-def write_parquet(record: Record, path: Path | str) -> None:
+def write_parquet(record: Record, path: Path | str, *, overwrite: bool = False) -> None:
     """Write a record as Parquet, with the columns of the CSV.
 
     Raises
@@ -57,8 +58,9 @@ def write_parquet(record: Record, path: Path | str) -> None:
     MissingExtraError
         Without the extra `parquet`.
     InputError
-        If the file can't be written; nothing is left behind.
+        As `write_csv`.
     """
+    require_output(path, "a table", (".parquet",), overwrite=overwrite)
     try:
         arrow: Any = import_module("pyarrow")
         parquet: Any = import_module("pyarrow.parquet")
@@ -68,23 +70,23 @@ def write_parquet(record: Record, path: Path | str) -> None:
     replace_file(Path(path), lambda neighbour: parquet.write_table(made, neighbour))
 
 
-FORMATS: dict[str, Callable[[Record, Path | str], None]] = {".csv": write_csv, ".parquet": write_parquet}
+FORMATS: dict[str, Callable[..., None]] = {".csv": write_csv, ".parquet": write_parquet}
 """Writers by the suffix of the file."""
 
 
-def export(record: Record, path: Path | str) -> None:
+def export(record: Record, path: Path | str, *, overwrite: bool = False) -> None:
     """Write a record as the table that the suffix of `path` asks for, ``.csv`` or ``.parquet``.
 
     Raises
     ------
     InputError
-        For another suffix, or if the file can't be written.
+        For another suffix, or as `write_csv`.
     """
     suffix = Path(path).suffix.lower()
     writer = FORMATS.get(suffix)
     if writer is None:
         raise InputError("not a table's suffix", file=str(path), value=suffix, expected=" or ".join(FORMATS))
-    writer(record, path)
+    writer(record, path, overwrite=overwrite)
 
 
 def _texts(column: np.ndarray) -> list[str]:

@@ -14,10 +14,14 @@ import numpy as np
 
 from dubins_traffic.cars.state import Contact, Event, Frames
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import require_output
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record import header, schema, wall
 from dubins_traffic.record.mcap_file import McapFile, Message
 from dubins_traffic.record.sink import Ending
+
+SUFFIX = ".mcap"
+"""How names of records end."""
 
 
 class RecordEncoder:
@@ -154,6 +158,7 @@ class RecordWriter:
                 file.close()
 
     def _open(self) -> BinaryIO:
+        require_output(self.path, "a record", (SUFFIX,), overwrite=self._overwrite)
         with self._written():
             file = self.path.open("wb" if self._overwrite else "xb")
             wall.sidecar(self.path).unlink(missing_ok=True)
@@ -169,6 +174,20 @@ class RecordWriter:
             raise InputError("the file exists", file=str(self.path), expected=expected) from error
         except OSError as error:
             raise InputError(f"can't be written: {error.strerror}", file=str(self.path)) from error
+
+
+def record_paths(output: Path, count: int, *, overwrite: bool) -> list[Path]:
+    """Return the paths of the records of several trials, `output` and ``-1``, ``-2``, ... of it.
+
+    Raises
+    ------
+    InputError
+        If one of them is refused (`files.require_output`).
+    """
+    paths = [output, *(output.with_stem(f"{output.stem}-{number}") for number in range(1, count))]
+    for path in paths:
+        require_output(path, "a record", (SUFFIX,), overwrite=overwrite)
+    return paths
 
 
 def encode_frames(frames: Frames, cars: int) -> list[Message]:

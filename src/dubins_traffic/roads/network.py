@@ -172,11 +172,15 @@ class RoadNetwork(Embedding, Pictured):
         """Return the RND document as plain text."""
         return write_lines(self.to_document())
 
-    def write(self, path: str | Path, map_format: MapFormat | None = None) -> None:
-        """Write a file, whole or not at all, in the format of its suffix; of one that is none's, plain text of RND.
+    def write(
+        self, path: str | Path, map_format: MapFormat | None = None, *, overwrite: bool = False
+    ) -> None:
+        """Write a file, whole or not at all, in the format of its suffix; what is no file gets plain text of RND.
 
-        `map_format` is asked before the registered ones.
+        `map_format` is asked before the registered ones. A path is refused as `files.require_output` says.
         """
+        known = files.packed(*formats.suffixes(map_format))
+        files.require_output(path, "a road network", known, overwrite=overwrite)
         form = formats.of_suffix(path, map_format)
         files.write_text(path, self.to_text() if form is None else form.write(self.to_document()))
 

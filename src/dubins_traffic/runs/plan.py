@@ -16,8 +16,10 @@ from pathlib import Path
 from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import exists, is_stream, require_output
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.files import DOCUMENTS
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.record.reader import Record
@@ -73,7 +75,8 @@ def concluded(
         If the file can't be written.
     """
     if results and data is not None and configuration is not None:
-        TrialData.build(configuration, [result.instance for result in results], began).write(data)
+        made = TrialData.build(configuration, [result.instance for result in results], began)
+        made.write(data, overwrite=True)
     return ScoreSheet(tuple(result.score for result in results))
 
 
@@ -164,7 +167,7 @@ def plan(
         jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
     if (first := jobs[0].instance) is not None:
         _check_first(os.fspath(source), first, controller, named=simulator is not None, show=show)
-    target = None if data is None else check_data_file(Path(data), overwrite_data)
+    target = None if data is None else check_data_file(Path(data), overwrite_data, source, rnd)
     jobs = [replace(job, deadline=deadline, show=show, metrics=tuple(metrics)) for job in jobs]
     if records is None:
         return Plan(tuple(job for job in jobs for _ in range(repeat)), configuration, target)
@@ -276,13 +279,13 @@ def _check_deadline(deadline: float | None) -> None:
         raise InputError("not a time", file="--deadline", value=deadline, expected="seconds, a number > 0")
 
 
-def check_data_file(path: Path, overwrite: bool) -> Path:
-    """Return `path` if a file can be written there; InputError if not, or if one exists and `overwrite` is false."""
-    if path.exists() and not overwrite:
-        raise InputError(
-            "exists", file=str(path), expected="a new file; --overwrite-trial-data (-F) overwrites"
-        )
-    if path.is_dir() or not path.parent.is_dir():
-        problem = "a folder" if path.is_dir() else "its folder does not exist"
-        raise InputError(problem, file=str(path), expected="a file to write")
+def check_data_file(path: Path, overwrite: bool, *read: str | os.PathLike[str] | None) -> Path:
+    """Return `path` if trial data can be written there; InputError, as of `files.require_output`, if not.
+
+    `overwrite` is whether a file that exists may be replaced, and `read` what is read and so never is.
+    """
+    if exists(path) and not is_stream(path) and not overwrite:
+        expected = "a new file; --overwrite-trial-data (-F) overwrites"
+        raise InputError("exists", file=str(path), expected=expected)
+    require_output(path, "trial data", DOCUMENTS, overwrite=True, apart_from=read)
     return path

@@ -287,7 +287,7 @@ def session_plan(
         controller,
         tuple(remote),
         None if records is None else check_folder(records),
-        None if data is None else check_data_file(Path(data), overwrite_data),
+        None if data is None else check_data_file(Path(data), overwrite_data, source, rnd),
         shield,
         overwrite,
         append,

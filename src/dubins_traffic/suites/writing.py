@@ -7,7 +7,7 @@ from pathlib import Path
 
 from dubins_traffic.campaign.report.csv_tables import csv_files
 from dubins_traffic.campaign.report.page import page
-from dubins_traffic.files import make_folder, write_text
+from dubins_traffic.files import make_folder, require_output, write_text
 from dubins_traffic.suites.cases_page import cases_page, cases_table, columns_of
 from dubins_traffic.suites.comparing import Source, compare_trials, made_by
 from dubins_traffic.suites.games_page import answers_of, games_page, games_table
@@ -42,16 +42,20 @@ def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
     }
 
 
-def write_results(suite: Suite, sources: Sequence[Source], folder: Path) -> str:
+def write_results(suite: Suite, sources: Sequence[Source], folder: Path, *, overwrite: bool = False) -> str:
     """Write the files of results into a folder and return the table in Markdown.
+
+    Files that are there are replaced only if `overwrite` is given.
 
     Raises
     ------
     InputError
-        As `results`, or if a file can't be written.
+        As `results`, if a path is refused (`files.require_output`), or if a file can't be written.
     """
     found = results(suite, sources)
     make_folder(folder, "results")
+    for name in found:
+        require_output(folder / name, "results", [Path(name).suffix], overwrite=overwrite)
     for name, text in found.items():
         write_text(folder / name, text)
     return found[TABLE]

@@ -21,6 +21,8 @@ from pydantic import TypeAdapter, ValidationError
 from dubins_traffic import files
 from dubins_traffic.errors import InputError
 
+ARCHIVE: Final = "an archive"
+SUFFIXES: Final = (".npz",)
 MOST_HEADER: Final = 16 << 20
 """Most bytes of the JSON in an archive."""
 WIDEST: Final = 8
@@ -32,29 +34,21 @@ DAMAGED: Final = (OSError, ValueError, EOFError, AttributeError, RuntimeError, S
 """What NumPy and zipfile raise for files that are not what they claim."""
 
 
-def check_target(path: str | Path, *, overwrite: bool = False) -> None:
-    """Refuse a path to which an archive could not be written later.
-
-    Parameters
-    ----------
-    path : str or Path
-        Where it is to be written.
-    overwrite : bool
-        Whether a file that is there may be replaced.
+def save_arrays(
+    path: str | Path,
+    header: Mapping[str, Any],
+    arrays: Mapping[str, npt.NDArray[Any]],
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Write an archive, its header first.
 
     Raises
     ------
     InputError
-        If a folder or a file is there, or its folder is missing or may not be written to.
+        If the path is refused (`files.require_output`), or the file can't be written.
     """
-    target = Path(path)
-    files.require_place(target)
-    if target.exists() and not overwrite:
-        raise InputError("exists already", file=str(path), expected="a new name, or --overwrite")
-
-
-def save_arrays(path: str | Path, header: Mapping[str, Any], arrays: Mapping[str, npt.NDArray[Any]]) -> None:
-    """Write an archive, its header first; InputError if that can't be done."""
+    files.require_output(path, ARCHIVE, SUFFIXES, overwrite=overwrite)
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
 
     def write(neighbour: Path) -> None:

@@ -69,8 +69,8 @@ def header(board: Board) -> dict[str, Any]:
     }
 
 
-def save_game(game: Game, path: str | Path) -> None:
-    """Write a game to a file, whole or not at all; InputError if that can't be done, or if the game is lean."""
+def save_game(game: Game, path: str | Path, *, overwrite: bool = False) -> None:
+    """Write a game to a file, as `save_arrays` does; InputError also if the game is lean."""
     if game.lean:
         raise InputError(
             "too large a game to be written",
@@ -88,4 +88,4 @@ def save_game(game: Game, path: str | Path) -> None:
         "owed_at": game.owed_at,
         "owed": game.owed,
     }
-    save_arrays(path, header(game.board), arrays)
+    save_arrays(path, header(game.board), arrays, overwrite=overwrite)

@@ -83,8 +83,8 @@ class Strategy:
             raise InputError("the strategy does not win from there", field="position", value=position)
         return int(options[np.argmin(np.where(ranks < 0, np.iinfo(np.int32).max, ranks))])
 
-    def save(self, path: str | Path) -> None:
-        """Write the strategy to a file, whole or not at all; InputError if that can't be done."""
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the strategy to a file, as `save_arrays` does."""
         arena = self.board.arena
         header = {
             "format": FORMAT,
@@ -100,7 +100,7 @@ class Strategy:
             **{f"start_{k}": own.start for k, own in enumerate(self.ranks)},
             **{f"debt_{k}": own.debt for k, own in enumerate(self.ranks)},
         }
-        save_arrays(path, header, arrays)
+        save_arrays(path, header, arrays, overwrite=overwrite)
 
     @classmethod
     def load(cls, path: str | Path) -> Strategy:

@@ -46,17 +46,17 @@ NETWORK, HELD, DROPPED = 4.5, 1.8, 1.0
 """Points."""
 
 
-def write_losses(path: str | os.PathLike[str], losses: Losses) -> None:
+def write_losses(path: str | os.PathLike[str], losses: Losses, *, overwrite: bool = False) -> None:
     """Draw what became of the roads of a map into the file `path`: PNG, SVG or PDF, by its suffix.
 
     Raises
     ------
     InputError
-        If the suffix is none of these, or the file can't be written.
+        As `viewer.plot.write_plot`.
     MissingExtraError
         If matplotlib is not installed.
     """
-    write_figure(path, lambda: _draw(losses))
+    write_figure(path, lambda: _draw(losses), overwrite=overwrite)
 
 
 def _draw(losses: Losses) -> Any:

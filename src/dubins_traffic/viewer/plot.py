@@ -12,7 +12,7 @@ import numpy as np
 
 from dubins_traffic.cars.body import Car
 from dubins_traffic.errors import InputError, MissingExtraError
-from dubins_traffic.files import replace_file
+from dubins_traffic.files import replace_file, require_output
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import Record
@@ -90,7 +90,7 @@ def plot(subject: Subject | Run) -> Any:
         return _draw(subject)
 
 
-def write_plot(path: str | os.PathLike[str], subject: Subject | Run) -> None:
+def write_plot(path: str | os.PathLike[str], subject: Subject | Run, *, overwrite: bool = False) -> None:
     """Draw `subject` into the file `path`: PNG, SVG or PDF, by its suffix.
 
     Parameters
@@ -99,21 +99,23 @@ def write_plot(path: str | os.PathLike[str], subject: Subject | Run) -> None:
         The picture to write; it appears only when complete.
     subject : RoadNetwork, Instance, Record or Result
         As `plot` takes it. Equal subjects give equal bytes with equal versions of matplotlib.
+    overwrite : bool
+        Whether a picture that is there may be replaced.
 
     Raises
     ------
     InputError
-        If the suffix is none of these, or the file can't be written.
+        If the suffix is none of these, `path` is refused (`files.require_output`), or the file can't be written.
     MissingExtraError
         If matplotlib is not installed.
     """
-    write_figure(path, lambda: _draw(subject))
+    write_figure(path, lambda: _draw(subject), overwrite=overwrite)
 
 
-def write_figure(path: str | os.PathLike[str], draw: Callable[[], Any]) -> None:
+def write_figure(path: str | os.PathLike[str], draw: Callable[[], Any], *, overwrite: bool = False) -> None:
     """Write the figure that `draw` returns to `path`; errors as those of `write_plot`."""
     target = Path(path)
-    require_picture(target)
+    require_picture(target, overwrite=overwrite)
     with _matplotlib().rc_context(STYLE):
         figure = draw()
         suffix = target.suffix.lower()
@@ -121,15 +123,18 @@ def write_figure(path: str | os.PathLike[str], draw: Callable[[], Any]) -> None:
         replace_file(target, lambda draft: figure.savefig(draft, **look))
 
 
-def require_picture(path: Path) -> None:
-    """Refuse a path with the suffix of no picture, and all where matplotlib is not installed."""
-    if path.suffix.lower() not in SUFFIXES:
-        raise InputError(
-            "not a picture",
-            file=str(path),
-            value=path.suffix,
-            expected=f"a suffix of {', '.join(SUFFIXES)}",
-        )
+def require_picture(
+    path: str | os.PathLike[str],
+    *,
+    overwrite: bool = False,
+    apart_from: Sequence[str | os.PathLike[str] | None] = (),
+) -> None:
+    """Refuse a path that no picture may be written to (`files.require_output`), and all without matplotlib."""
+    target = Path(path)
+    if target.suffix.lower() not in SUFFIXES:
+        expected = f"a suffix of {', '.join(SUFFIXES)}"
+        raise InputError("not a picture", file=str(path), value=target.suffix, expected=expected)
+    require_output(target, "a picture", SUFFIXES, overwrite=overwrite, apart_from=apart_from)
     _matplotlib()
 
 

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from dubins_traffic.cars.body import Body, Disc, DiscObstacle, Obstacle
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import replace_file
+from dubins_traffic.files import replace_file, require_output
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import Ending
@@ -47,6 +47,8 @@ SCRIPTS = (
 )
 HEADING_STEPS = 32767
 UNITS = ("s", "m")
+PAGES = (".html", ".htm")
+"""How names of pages end."""
 
 
 def write_replay(
@@ -57,6 +59,8 @@ def write_replay(
     summary: Mapping[str, object] | None = None,
     marks: Sequence[Mark] = (),
     verdict: Verdict | None = None,
+    *,
+    overwrite: bool = False,
 ) -> None:
     """Write the page that replays a trial.
 
@@ -76,12 +80,15 @@ def write_replay(
         What else to show on the timeline; contacts, events and visits of goals are there already.
     verdict : Verdict, optional
         The verdict on the trial: its breaches are marked on the timeline and on the map, and what excused the ego.
+    overwrite : bool
+        Whether a page that is there may be replaced.
 
     Raises
     ------
     InputError
-        If there is no frame, or the page can't be written.
+        If there is no frame, `path` is refused (`files.require_output`), or the page can't be written.
     """
+    require_output(path, "a page", PAGES, overwrite=overwrite)
     text = replay_page(instance, frames, ending, summary, marks, verdict)
     replace_file(Path(path), lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
 

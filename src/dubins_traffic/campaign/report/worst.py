@@ -180,5 +180,5 @@ def replay(campaign: Campaign, row: Mapping[str, Any], page: Path) -> rows.Row:
         found = reader.read(record)
     verdict = score(found).verdict
     summary = {"controller": row["controller"], **{name: row[name] for name in SUMMARY}}
-    write_replay(page, found.instance, found.frames, found.ending, summary, verdict=verdict)
+    write_replay(page, found.instance, found.frames, found.ending, summary, verdict=verdict, overwrite=True)
     return rows.row(chunk.number, result.ending, result.score, result.wall.act_s)

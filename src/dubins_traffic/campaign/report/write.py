@@ -17,7 +17,8 @@ from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import make_folder, write_text
+from dubins_traffic.files import make_folder, require_output, write_text
+from dubins_traffic.viewer.replay import PAGES
 
 REPORT = "report"
 PAGE = "index.html"
@@ -39,6 +40,7 @@ def write_report(
     worst: int = 3,
     wall: bool = False,
     progress: Callable[[int, int], object] | None = None,
+    overwrite: bool = False,
 ) -> Written:
     """Compare the controllers of a campaign and write a page, its numbers as CSV and the replays it links to.
 
@@ -56,6 +58,8 @@ def write_report(
         Whether to tell what was measured on a wall clock.
     progress : callable, optional
         Is told how many of how many replays there are.
+    overwrite : bool
+        Whether files of `output` that are there may be replaced; those of ``report`` in `folder` always are.
 
     Raises
     ------
@@ -73,16 +77,24 @@ def write_report(
     comparison = compare(campaign, results, clock)
     target = place / REPORT if output is None else Path(output)
     make_folder(target, "a report")
+    texts = csv_files(comparison)
+    for name in (PAGE, *texts):
+        suffix = Path(name).suffix
+        require_output(target / name, "a report", [suffix], overwrite=overwrite or output is None)
     ranked = comparison.controllers
     bad = find_worst(campaign, results, ranked, worst, target, progress or _silent) if worst else {}
-    for name, text in csv_files(comparison).items():
+    for name, text in texts.items():
         write_text(target / name, text)
     write_text(target / PAGE, page(comparison, known, bad))
     return Written(comparison, bad, target / PAGE)
 
 
 def replay_trial(
-    folder: str | os.PathLike[str], number: int, output: str | os.PathLike[str] | None = None
+    folder: str | os.PathLike[str],
+    number: int,
+    output: str | os.PathLike[str] | None = None,
+    *,
+    overwrite: bool = False,
 ) -> tuple[Path, str]:
     """Run a trial of a campaign again and write its replay.
 
@@ -94,6 +106,8 @@ def replay_trial(
         Number of the trial in the campaign, the column `number` of its table.
     output : path, optional
         The page; by default where a report has it.
+    overwrite : bool
+        Whether a page `output` that is there may be replaced.
 
     Returns
     -------
@@ -107,6 +121,8 @@ def replay_trial(
     InputError
         If there is no campaign in `folder`, the trial has not been run, or the page can't be written.
     """
+    if output is not None:
+        require_output(output, "a page", PAGES, overwrite=overwrite)
     place = Path(folder)
     _, campaign, parts = _open(place)
     results = table.read(place, campaign, parts)
@@ -115,8 +131,11 @@ def replay_trial(
     if not found:
         expected = f"the number of a trial that has been run; {len(results)} of {campaign.total} have"
         raise InputError("no such trial", file=str(place), field="number", value=number, expected=expected)
-    target = place / REPORT / replay_name(number) if output is None else Path(output)
-    make_folder(target.parent, "a report")
+    if output is None:
+        target = place / REPORT / replay_name(number)
+        make_folder(target.parent, "a report")
+    else:
+        target = Path(output)
     again = replay(campaign, found[0], target)
     return target, "" if same(found[0], again) else OTHER_WAY
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 from xml.etree.ElementTree import Element
 
-from dubins_traffic.files import write_text
+from dubins_traffic.files import packed, require_output, write_text
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.simulators.gazebo.roads import roads
 from dubins_traffic.simulators.gazebo.sdf import numbers, pose, tag, text, visual
@@ -66,9 +66,20 @@ def outlook(network: RoadNetwork) -> list[Element]:
 
 
 def write_sdf(
-    what: RoadNetwork | Instance, path: str | PathLike[str], version: Version = Version.CLASSIC
+    what: RoadNetwork | Instance,
+    path: str | PathLike[str],
+    version: Version = Version.CLASSIC,
+    *,
+    overwrite: bool = False,
 ) -> None:
-    """Write `to_sdf` to a file, whole or not at all; InputError if it can't be written."""
+    """Write `to_sdf` to a file `*.sdf`, whole or not at all.
+
+    Raises
+    ------
+    InputError
+        If the path is refused (`files.require_output`), or the file can't be written.
+    """
+    require_output(path, "a world", packed(".sdf"), overwrite=overwrite)
     write_text(Path(path), to_sdf(what, version))
 
 
