@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
@@ -100,8 +100,9 @@ class Campaign:
             check_names([entry.name for entry in model.configurations], "configurations")
             check_names([bare_name(spec) for spec in model.controllers], "controllers")
             found = places or tuple(_place(spec, k, folder) for k, spec in enumerate(model.controllers))
-            own_metrics = scores.with_share(model.metrics, found if places is None else ())
-            further = metrics or _metrics(own_metrics, folder)
+            if places is None:
+                model = model.model_copy(update={"metrics": list(scores.with_share(model.metrics, found))})
+            further = metrics or _metrics(model.metrics, folder)
             cells = tuple(_cells(model, configurations))
         except InputError as error:
             raise error.within(file=file) from None
@@ -195,7 +196,7 @@ def _place(spec: str, index: int, folder: Path | None) -> str:
     return spec
 
 
-def _metrics(specs: Sequence[str], folder: Path | None) -> tuple[tuple[str, ...], tuple[Column, ...]]:
+def _metrics(specs: list[str], folder: Path | None) -> tuple[tuple[str, ...], tuple[Column, ...]]:
     """Return the metrics' names, with full paths if they are files, and their columns; each is loaded once."""
     places = tuple(outside.resolved(spec, folder) for spec in specs)
     found: list[Column] = []

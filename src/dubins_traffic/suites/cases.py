@@ -21,7 +21,7 @@ from dubins_traffic.runs.jobs import Job, run_trials
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.scoring.registry import STRATEGY_SHARE
-from dubins_traffic.suites.results import KEPT, save, told
+from dubins_traffic.suites.results import KEPT, played, save
 from dubins_traffic.suites.settings import CaseEntry
 from dubins_traffic.suites.suite import Suite
 
@@ -107,7 +107,7 @@ def run_cases(
             {
                 "controller": name,
                 "file": hash_of_file(spec),
-                "columns": told({column: own[column] for column in (*KEPT, STRATEGY_SHARE)}),
+                "columns": played({column: own[column] for column in (*KEPT, STRATEGY_SHARE)}),
             }
             for (name, own), spec in zip(columns.items(), specs, strict=True)
         ]

@@ -47,13 +47,13 @@ def save_trials(suite: Suite, campaign: Campaign, folder: Path) -> Path:
         own = [place for place, one in enumerate(found["controller"].to_pylist()) if one == name]
         picked, times = found.take(own), clock.take(own)
         share = [STRATEGY_SHARE] if STRATEGY_SHARE in found.column_names else []
-        columns = told({column: picked[column].to_pylist() for column in (*KEPT, *share)})
+        columns = played({column: picked[column].to_pylist() for column in (*KEPT, *share)})
         entries.append({"controller": name, "file": known["controllers"][k]["file"], "columns": columns})
         seconds[name] = {column: times[column].to_pylist() for column in rows.WALL}
     return save(suite, folder, {"trials": campaign.model.trials, "entries": entries}, {"entries": seconds})
 
 
-def told(columns: Mapping[str, Sequence[Any]]) -> dict[str, Sequence[Any]]:
+def played(columns: Mapping[str, Sequence[Any]]) -> dict[str, Sequence[Any]]:
     """Return the columns of an entry without that of a strategy's share where the ego played none."""
     return {
         name: values
