@@ -102,16 +102,12 @@ def leaping() -> tuple[int, dict[tuple[int, int], int]]:
     return first, {(own, other): to if own == first else after[to] for (own, other), to in steps.items()}
 
 
+ELSEWHERE = r"begins in cell \d, and the ego starts in cell \d"
+LEAP = r"sends the ego from cell \d to cell \d, which is no move of the game"
+NOTHING = r"has no answer where the cars are in cells"
 NO_MOVE = [
-    *(
-        (elsewhere, form, r"begins in cell \d, and the ego starts in cell \d")
-        for form in FORMS
-        if "slugs" not in form
-    ),
-    *(
-        (leaping, form, r"sends the ego from cell \d to cell \d, which is no move of the game")
-        for form in FORMS
-    ),
+    *((elsewhere, form, ELSEWHERE) for form in FORMS if "slugs" not in form),
+    *((leaping, form, NOTHING if "slugs" in form else LEAP) for form in FORMS),
 ]
 
 
@@ -129,6 +125,48 @@ def test_who_makes_no_move_of_the_game_ends_the_trial_unless_the_rules_may_go_on
     record = drive(f"{path}+fallback", tmp_path)
     assert len(record.frames) == 1801
     assert STRATEGY_LEFT in [event.kind for block in record.blocks for event in block.events]
+
+
+CASE_SUITE: dict[str, Any] = {"version": 0, "name": "mine", "title": "One road", "metric": "counted_rounds"}
+
+
+def test_commands_tell_and_store_how_much_the_strategy_decided(
+    strategies: dict[str, Path],
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("road.json").write_text(json.dumps(foreign.ROAD))
+    Path("one.json").write_text(json.dumps(instance_to_document(foreign.instance())))
+    good = strategies["hoa"]
+    monkeypatch.setattr(foreign, "machine", elsewhere)
+    Path("bad").mkdir()
+    bad = f"{foreign.files(Path('bad'))['hoa']}+fallback"
+    for spec, share in ((str(good), 1.0), (bad, 0.0)):
+        assert main(["run", "one.json", "--controller", spec, "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["trials"][0]["metrics"] == {"strategy_share": share}
+        assert main(["batch", "road.json", "--controller", spec, "--trials", "1", "--json"]) == 0
+        assert json.loads(capsys.readouterr().out)["trials"][0]["metrics"] == {"strategy_share": share}
+    assert main(["run", "one.json", "--controller", bad]) == 0
+    assert " 0.0%" in capsys.readouterr().out
+    document = instance_to_document(foreign.instance())
+    cases = {**CASE_SUITE, "cases": [{"name": "one", "document": document}]}
+    trials = {"name": "road", "document": foreign.ROAD}
+    own = {"version": 0, "seed": 5, "trials": 1, "controllers": ["rules"], "configurations": [trials]}
+    for name, suite in (("cases", cases), ("trials", {**CASE_SUITE, "campaign": own})):
+        Path(f"{name}.json").write_text(json.dumps(suite))
+        arguments = ["suite", "run", f"{name}.json", "--workers", "1", "-o", f"out-{name}"]
+        assert main([*arguments, "--controller", bad, "--controller", "rules"]) == 0
+        out = capsys.readouterr().out
+        assert f"{Path(bad).name}: the strategy made 0.0% of the decisions" in out
+        assert "rules: the strategy" not in out
+        file = next(path for path in Path(f"out-{name}").glob("mine-*.json") if ".wall." not in path.name)
+        first, second = json.loads(file.read_text())["entries"]
+        assert first["columns"]["strategy_share"] == [0.0]
+        assert "strategy_share" not in second["columns"]
+        assert main(["suite", "compare", "--suite", f"{name}.json", str(file)]) == 0
+        capsys.readouterr()
 
 
 def swapped(text: str) -> str:
@@ -166,6 +204,14 @@ def test_a_machine_with_another_split_of_the_players_is_refused(
         with pytest.raises(InputError, match=f"a strategy that {message}"):
             registry.load(spec).start(foreign.instance().problem)
     assert run_trial(foreign.instance(), str(path)).ending.end == "controller_fault"
+
+
+def test_a_machine_that_does_not_say_what_it_reads_is_found_out_when_it_answers(tmp_path: Path) -> None:
+    path = tmp_path / "swapped"
+    path.write_text(swapped(foreign.as_hoa()).replace("controllable-AP: 2 3\n", ""))
+    result = run_trial(foreign.instance(), str(path))
+    assert result.ending.end == "controller_fault"
+    assert "+fallback" in result.ending.detail
 
 
 @pytest.mark.parametrize("given", ["0 9", "0\ncontrollable-AP: 1", "x"])

@@ -100,6 +100,8 @@ class Campaign:
             check_names([entry.name for entry in model.configurations], "configurations")
             check_names([bare_name(spec) for spec in model.controllers], "controllers")
             found = places or tuple(_place(spec, k, folder) for k, spec in enumerate(model.controllers))
+            if places is None:
+                model = model.model_copy(update={"metrics": list(scores.with_share(model.metrics, found))})
             further = metrics or _metrics(model.metrics, folder)
             cells = tuple(_cells(model, configurations))
         except InputError as error:

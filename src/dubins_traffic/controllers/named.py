@@ -64,12 +64,20 @@ def load(spec: str) -> Controller:
     if spec.endswith(".npz"):
         learned = _module("learned")
         return cast(Controller, (learned if learned.is_policy(spec) else _module("synthesized")).player(spec))
-    file = spec if is_file(spec) else spec.removesuffix(FALLBACK)
-    if is_file(file) and (not file.endswith(".py") or begins_with(file, CLASS_FIRST)):
+    if (file := foreign(spec)) is not None:
         return cast(Controller, _module("synthesized").foreign_player(file, fallback=file != spec))
     if not outside.is_place(spec):
         raise _SEAM.refuse("unknown controller", spec, _EXPECTED.format(", ".join(BUILT_IN)))
     return cast(Controller, outside.make(outside.find(spec, _SEAM), spec, _SEAM))
+
+
+def foreign(spec: str) -> str | None:
+    """Return the file of the strategy of another tool that a name stands for, None for any other controller."""
+    if spec.endswith((".mcap", ".npz")):
+        return None
+    file = spec if is_file(spec) else spec.removesuffix(FALLBACK)
+    plays = is_file(file) and (not file.endswith(".py") or begins_with(file, CLASS_FIRST))
+    return file if plays else None
 
 
 def _module(name: str) -> Any:

@@ -109,6 +109,11 @@ def shielded(spec: str) -> str:
     return spec if is_shielded(spec) else spec + SHIELDED
 
 
+def plays_foreign(spec: str) -> bool:
+    """Tell whether a name stands for a strategy of another tool, with or without a shield."""
+    return named.foreign(_SHIELD.sub("", spec)) is not None
+
+
 def sandboxed(spec: str, limits: str = "") -> str:
     """Return the name of the same controller in a box; a shield stays outside the box.
 

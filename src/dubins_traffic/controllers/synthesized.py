@@ -17,7 +17,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.policies.rules.exits import BACK
 from dubins_traffic.policies.rules.room import MARGIN
 from dubins_traffic.policies.rules.tables import Drivers
-from dubins_traffic.record.sink import SHIELD
+from dubins_traffic.record.sink import BY_RULES, BY_STRATEGY, DECIDED, SHIELD
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.shield.filter import ShieldFilter
@@ -178,6 +178,8 @@ class Synthesized(Rules):
         if seen.propositions.crosses >= 0:
             return
         pursuit.advice = pursuit.adviser.advise(pursuit.play, goal, following)
+        if isinstance(pursuit.adviser, MachineAdviser) and pursuit.play.at_lanes_end:
+            pursuit.reports.append((DECIDED, BY_RULES if pursuit.advice is None else BY_STRATEGY))
         if pursuit.advice is None or not pursuit.advice.exits:
             return
         lane = seen.propositions.lane

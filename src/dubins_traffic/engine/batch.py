@@ -130,7 +130,7 @@ def run_batch(
             raise InputError("too few", field=name, value=value, expected="at least 1")
     kept, folder = chosen(keep, count), folder_of(keep, records)
     instances = draw_many(configuration, seed, range(first, first + count))
-    makers = scores.makers(metrics)
+    makers = scores.makers(scores.with_share(metrics, [controller]))
     each = outcomes(instances, controller, batch=batch, threads=threads, metrics=makers)
     if folder is not None:
         own = partial(draw, configuration, seed)

@@ -63,6 +63,11 @@ FAULTS: Final = BY_CONTROLLER | {End.AGENT_FAULT, End.TRANSPORT_LOST, End.WORLD_
 
 SHIELD: Final = "shield"
 """Kind of the events that note that a shield has stepped in."""
+DECIDED: Final = "decided"
+"""Kind of the events that note who made a decision: a strategy of another tool, or the rules in its place."""
+BY_STRATEGY: Final = "strategy"
+BY_RULES: Final = "rules"
+"""Details of these events."""
 
 
 @dataclass(frozen=True, slots=True)

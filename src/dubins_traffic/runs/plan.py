@@ -149,7 +149,7 @@ def plan(
     named = _default_controller(found) if controller is None else controller
     controller = controllers.dressed(named, shield=shield, sandbox=sandbox)
     controllers.load(controller)
-    scores.columns(metrics)
+    scores.columns(further := scores.with_share(metrics, [controller]))
     _check_deadline(deadline)
     check_choice(records, data, overwrite=overwrite, append=append)
     configuration = None
@@ -168,7 +168,7 @@ def plan(
     if (first := jobs[0].instance) is not None:
         _check_first(os.fspath(source), first, controller, named=simulator is not None, show=show)
     target = None if data is None else check_data_file(Path(data), overwrite_data, source, rnd)
-    jobs = [replace(job, deadline=deadline, show=show, metrics=tuple(metrics)) for job in jobs]
+    jobs = [replace(job, deadline=deadline, show=show, metrics=further) for job in jobs]
     if records is None:
         return Plan(tuple(job for job in jobs for _ in range(repeat)), configuration, target)
     folder = check_folder(records)

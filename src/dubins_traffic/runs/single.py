@@ -18,6 +18,7 @@ from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Controller, Driver, Ending, Simulator, Sink
 from dubins_traffic.record import wall
 from dubins_traffic.record.writer import RecordWriter
+from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import MetricSpec
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators import registry as simulators
@@ -243,6 +244,7 @@ def run_trial(
     InputError
         If the controller or a metric can't be loaded, or the record can't be written.
     """
+    metrics = scores.with_share(metrics, [controller])
     called, driver = _driver(controller, link)
     name = called if name is None else name
     scorer, paths = Scorer(metrics), Paths()

@@ -82,10 +82,9 @@ class BatchScores:
         obligations after the last frame, `entry` the margins of rule 3.
         """
         own, margins = self._tally.trial[b], self._found[b]
-        rate, ticks = instance.problem.rate, ending.ticks
+        rate, ticks, whole = instance.problem.rate, ending.ticks, ran_whole(instance, ending, ending.ticks)
         goals = [self._tally.goal[g] for g in range(own.first_goal, own.last_goal)]
         visits = _visits(instance, goals, own.rounds)
-        whole = ran_whole(instance, ending, ticks)
         collisions, among_others = _collisions(instance, contacts) if contacts else ((), 0)
         gap = None if math.isinf(own.clearance) else max(0.0, own.clearance)
         verdict = None

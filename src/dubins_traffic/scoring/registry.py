@@ -7,17 +7,21 @@ file beside this one and a line in `BUILT_IN`, or a class outside the package (d
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
 from importlib import import_module
-from typing import Any, cast, get_args
+from typing import Any, TypeVar, cast, get_args
 
 from dubins_traffic import outside
+from dubins_traffic.controllers.registry import plays_foreign
 from dubins_traffic.errors import InputError
 from dubins_traffic.outside import Seam
 from dubins_traffic.scoring.metric import KINDS, Column, Kind, Maker, MetricSpec
 
+STRATEGY_SHARE = "strategy_share"
+"""The metric that every trial has whose ego plays a strategy of another tool."""
 BUILT_IN = {
+    STRATEGY_SHARE: ("dubins_traffic.scoring.strategy_share", "StrategyShare"),
     "time_to_collision": ("dubins_traffic.scoring.time_to_collision", "TimeToCollision"),
 }
 """The metrics of this package by name: module and class."""
@@ -30,6 +34,7 @@ _SEAM = Seam(
     ("begin", "frames", "end", "result"),
     "columns, begin(instance), frames(frames), end(ending) and result() -> mapping",
 )
+Spec = TypeVar("Spec", bound=MetricSpec)
 _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 
 
@@ -78,6 +83,14 @@ def makers(specs: Sequence[MetricSpec]) -> tuple[Maker, ...]:
     found = tuple(_maker(spec) for spec in specs)
     columns(found)
     return found
+
+
+def with_share(specs: Iterable[Spec], controllers: Iterable[object]) -> tuple[Spec | str, ...]:
+    """Return further metrics, and with them `strategy_share` if a controller plays a strategy of another tool."""
+    own = tuple(specs)
+    if STRATEGY_SHARE in own or not any(isinstance(one, str) and plays_foreign(one) for one in controllers):
+        return own
+    return (*own, STRATEGY_SHARE)
 
 
 def forget() -> None:

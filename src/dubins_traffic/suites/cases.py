@@ -18,13 +18,15 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.runs.jobs import Job, run_trials
+from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.notice import fault_notice
-from dubins_traffic.suites.results import KEPT, save
+from dubins_traffic.scoring.registry import STRATEGY_SHARE
+from dubins_traffic.suites.results import KEPT, played, save
 from dubins_traffic.suites.settings import CaseEntry
 from dubins_traffic.suites.suite import Suite
 
 FILE: Final = "cases.jsonl"
-COLUMNS: Final = (*KEPT, "reason", *rows.WALL)
+COLUMNS: Final = (*KEPT, STRATEGY_SHARE, "reason", *rows.WALL)
 """What is kept of a case; reasons stay in the folder."""
 Found = dict[str, dict[str, dict[str, Any]]]
 """What came of each case, by controller and case: columns of a campaign's table."""
@@ -98,14 +100,14 @@ def run_cases(
         _run(suite, file, instances, specs, found, workers, progress or (lambda _done, _total: None))
         named = {bare_name(spec): found[bare_name(spec)] for spec in specs}
         columns = {
-            name: {column: [own[case][column] for case in instances] for column in (*KEPT, *rows.WALL)}
+            name: {column: [own[case][column] for case in instances] for column in COLUMNS}
             for name, own in named.items()
         }
         listed = [
             {
                 "controller": name,
                 "file": hash_of_file(spec),
-                "columns": {column: own[column] for column in KEPT},
+                "columns": played({column: own[column] for column in (*KEPT, STRATEGY_SHARE)}),
             }
             for (name, own), spec in zip(columns.items(), specs, strict=True)
         ]
@@ -128,10 +130,11 @@ def _run(
     for spec in specs:
         own = found.setdefault(bare_name(spec), {})
         left = [instance for name, instance in instances.items() if name not in own]
-        jobs = [Job(one.trial or 0, one.seed or 0, spec, instance=one) for one in left]
+        metrics = scores.with_share((), [spec])
+        jobs = [Job(one.trial or 0, one.seed or 0, spec, instance=one, metrics=metrics) for one in left]
         for result in run_trials(jobs, workers):
             row = rows.row(0, result.ending, result.score, result.wall.act_s)
-            own[cases[_key(result.instance)]] = {column: row[column] for column in COLUMNS}
+            own[cases[_key(result.instance)]] = {column: row.get(column) for column in COLUMNS}
             _keep(file, suite, found)
             progress(sum(map(len, found.values())), total)
 

@@ -14,6 +14,7 @@ from dubins_traffic.files import is_file, read_text, write_text
 from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import parse_json
 from dubins_traffic.release import sources_hash
+from dubins_traffic.scoring.registry import STRATEGY_SHARE
 from dubins_traffic.scoring.verdict import Ruling
 from dubins_traffic.suites.result_model import FORMAT, WALL_FORMAT, ResultModel, WallModel
 from dubins_traffic.suites.suite import Suite
@@ -45,10 +46,32 @@ def save_trials(suite: Suite, campaign: Campaign, folder: Path) -> Path:
     for k, name in enumerate(campaign.controllers):
         own = [place for place, one in enumerate(found["controller"].to_pylist()) if one == name]
         picked, times = found.take(own), clock.take(own)
-        columns = {column: picked[column].to_pylist() for column in KEPT}
+        share = [STRATEGY_SHARE] if STRATEGY_SHARE in found.column_names else []
+        columns = played({column: picked[column].to_pylist() for column in (*KEPT, *share)})
         entries.append({"controller": name, "file": known["controllers"][k]["file"], "columns": columns})
         seconds[name] = {column: times[column].to_pylist() for column in rows.WALL}
     return save(suite, folder, {"trials": campaign.model.trials, "entries": entries}, {"entries": seconds})
+
+
+def played(columns: Mapping[str, Sequence[Any]]) -> dict[str, Sequence[Any]]:
+    """Return the columns of an entry without that of a strategy's share where the ego played none."""
+    return {
+        name: values
+        for name, values in columns.items()
+        if name != STRATEGY_SHARE or any(value is not None for value in values)
+    }
+
+
+def shares(path: Path) -> list[str]:
+    """Return a line for each entry of a file of results that played a strategy of another tool: how much it decided."""
+    lines: list[str] = []
+    for entry in load_results(path)[0].entries:
+        known = [float(value) for value in entry.columns.get(STRATEGY_SHARE, ()) if value is not None]
+        if known:
+            lines.append(
+                f"{entry.controller}: the strategy made {sum(known) / len(known):.1%} of the decisions"
+            )
+    return lines
 
 
 def save(suite: Suite, folder: Path, found: Mapping[str, Any], seconds: Mapping[str, Any]) -> Path:

@@ -116,6 +116,11 @@ class RoadPlay:
         self._ticket = [NO_TICKET] * (board.others + 1)
         self._bits = [0] * (board.others + 1)
 
+    @property
+    def at_lanes_end(self) -> bool:
+        """Whether the ego holds the end of a lane, so that it has to decide what to do before an intersection."""
+        return self.position is not None and self.cells[EGO_CAR] >= len(self._board.arena.nodes)
+
     def follow(self, tick: int, cars: Sequence[Sighting]) -> bool:
         """Take in a frame, the ego first in `cars`; return whether anything has changed."""
         signature = [(car.car, *car.propositions[2:4], car.propositions.bits & WAITS) for car in cars]
