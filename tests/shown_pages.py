@@ -192,8 +192,8 @@ PAGES: dict[str, Page] = {
     ),
     "verdicts.md": Page(there=(recorded("town"), files(old__json=OLD, mine__json=MISSPELT))),
     "tour.md": Page(
-        there=(clone("examples/competition"),),
         needs=(need_boxes,),
+        before={"dubins-traffic evaluate": shorter},
         elsewhere=frozenset({"sh", "python", "toml"}),
     ),
     "tutorials/competition.md": Page(

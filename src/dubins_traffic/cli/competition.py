@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json as json_text
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from dubins_traffic.cli import faults, options
-from dubins_traffic.errors import shown
+from dubins_traffic.errors import InputError, shown
 
 if TYPE_CHECKING:
     from dubins_traffic.competition.competition import Phase
@@ -187,7 +188,15 @@ def _key(phase: Phase, key_file: str | None, *, confirm: bool = False) -> bytes:
 
     if key_file is not None:
         return checked_key(read_key(Path(key_file), phase.folder))
-    text: str = typer.prompt("Passphrase", hide_input=True, confirmation_prompt=confirm, err=True)
+    try:
+        os.close(os.open("/dev/tty", os.O_RDWR))  # where a passphrase is asked for
+        text: str = typer.prompt("Passphrase", hide_input=True, confirmation_prompt=confirm, err=True)
+    except (OSError, typer.Abort):
+        raise InputError(
+            "no passphrase was typed, nor is a key file named",
+            file="--key-file",
+            expected="KEY, a file outside the folder of the competition, or a terminal to type at",
+        ) from None
     return checked_key(text.encode())
 
 

@@ -10,7 +10,7 @@ import typer
 from dubins_traffic.cli import options
 
 EXAMPLES = options.examples(
-    "serve season --competition examples/competition",
+    "serve season --competition spring",
     "serve season --workers 4 --key-file /etc/season.key",
     "serve season --host 0.0.0.0 --port 8000 --workers 0",
 )

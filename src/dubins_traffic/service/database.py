@@ -10,15 +10,20 @@ import contextlib
 import threading
 import time
 from collections.abc import Callable, Generator
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, TypeVar
 
 from alembic import command
 from alembic.config import Config
+from alembic.runtime.migration import MigrationContext
+from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, Engine, create_engine, event, text
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
+
+from dubins_traffic.errors import InputError
 
 WRITERS_LOCK = 0x64756269
 """Number of the lock that writers hold on PostgreSQL."""
@@ -93,16 +98,37 @@ class Database:
         return failed
 
     def migrate(self, revision: str = "head") -> None:
-        """Bring the tables to those of this version of the package, whatever version made them."""
+        """Bring the tables to those of this version of the package, whatever version before it made them.
+
+        Raises
+        ------
+        InputError
+            If a later version made them.
+        """
         config = Config()
         config.set_main_option("script_location", str(Path(__file__).with_name("migrations")))
         with self._writes.begin() as connection:
             config.attributes["connection"] = connection
+            _check_known(connection, ScriptDirectory.from_config(config))
             command.upgrade(config, revision)
 
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+def _check_known(connection: Connection, known: ScriptDirectory) -> None:
+    found = MigrationContext.configure(connection).get_current_revision()
+    ours = {own.revision for own in known.walk_revisions()}
+    if found is not None and found not in ours:
+        raise InputError(
+            "a later version of dubins-traffic made these tables",
+            file=connection.engine.url.render_as_string(hide_password=True),
+            field="version of the tables",
+            value=found,
+            expected=f"{known.get_current_head()} at most: this is dubins-traffic {version('dubins-traffic')}; install "
+            "the version that made them, or restore the backup from before the upgrade",
+        )
 
 
 def _prepare_sqlite(connection: Any, _entry: ConnectionPoolEntry) -> None:

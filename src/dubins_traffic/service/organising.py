@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition import sealing
 from dubins_traffic.competition.competition import FILE, load_competition
 from dubins_traffic.competition.competition import Competition as Loaded
-from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.errors import DubinsTrafficError, InputError, shown
 from dubins_traffic.service import submissions
 from dubins_traffic.service.accounts import WrongEntryError, note
 from dubins_traffic.service.office import Office, competition_of
@@ -80,18 +80,19 @@ def slug_of(path: Path) -> str:
 
 
 def files_of(path: Path) -> Mapping[str, bytes]:
-    """Return the files of a competition that lies in a folder, or is one file."""
+    """Return the files of a competition that lies in a folder, but for those that tools hide there, or is one file."""
     if path.is_file():
         return {FILE: path.read_bytes()}
     if not (path / FILE).is_file():
         raise InputError("no competition", file=str(path / FILE), expected="a competition file, TOML")
-    return {item.name: item.read_bytes() for item in sorted(path.iterdir()) if item.is_file()}
+    items = sorted(item for item in path.iterdir() if item.is_file() and not item.name.startswith("."))
+    return {item.name: item.read_bytes() for item in items}
 
 
 def _written(draft: Path, given: Mapping[str, bytes]) -> Loaded:
     for name, data in given.items():
         if not PLAIN.fullmatch(name):
-            raise WrongEntryError("files: names of letters, digits, '.', '_' and '-'")
+            raise WrongEntryError(f"files: {shown(name, 60)}: names of letters, digits, '.', '_' and '-'")
         (draft / name).write_bytes(data)
     for entry in _named_files(draft):
         if not PLAIN.fullmatch(entry):

@@ -19,7 +19,6 @@ from litestar.openapi.spec import Components, SecurityScheme
 from litestar.plugins.jinja import JinjaTemplateEngine
 from litestar.response import Redirect, Template
 from litestar.static_files import create_static_files_router  # pyright: ignore[reportUnknownVariableType]
-from litestar.stores.file import FileStore
 from litestar.template import TemplateConfig
 from sqlalchemy.exc import DBAPIError
 
@@ -34,7 +33,7 @@ from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import api, doors, login, metrics, organisers, pages, submitting, team
 from dubins_traffic.service.web.bodies import Bodies
 from dubins_traffic.service.web.said import moment
-from dubins_traffic.service.web.sessions import SessionConfig
+from dubins_traffic.service.web.sessions import SessionConfig, SessionFiles
 from dubins_traffic.service.web.viewer import PROGRAMS, Recognition, Viewer
 
 log = structlog.get_logger("dubins_traffic.service")
@@ -75,7 +74,7 @@ def create_app(office: Office) -> Litestar:
     files = create_static_files_router(
         "/static", [Path(__file__).with_name("static")], include_in_schema=False
     )
-    kept = FileStore(office.folder / "sessions", create_directories=True)
+    kept = SessionFiles(office.folder / "sessions", create_directories=True)
     return Litestar(
         route_handlers=[*handlers, doors.Doors, metrics.metrics, files],
         dependencies={"office": Provide(give_office), "viewer": Provide(_viewer)},

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import contextlib
 from typing import Any
 
 from litestar.connection import ASGIConnection
 from litestar.middleware.session.server_side import ServerSideSessionBackend, ServerSideSessionConfig
+from litestar.stores.base import StorageObject
+from litestar.stores.file import FileStore
 from litestar.types import Empty, Message
+from msgspec import MsgspecError
 
 LOADED = "loaded_session"
 """Where the state of a request holds what its session was when it came."""
@@ -38,6 +42,17 @@ class Sessions(ServerSideSessionBackend):
         if known:
             await self.delete(known, self.config.get_store_from_app(connection.scope["litestar_app"]))
         await super().store_in_message(scope_session, message, connection)  # pyright: ignore[reportUnknownMemberType]
+
+
+class SessionFiles(FileStore):
+    """Sessions in files."""
+
+    async def delete_expired(self) -> None:
+        """Remove what has expired; a file that is no session, such as one of a desktop, is left where it is."""
+        async for path in self.path.iterdir():
+            with contextlib.suppress(MsgspecError, OSError):
+                if StorageObject.from_bytes(await path.read_bytes()).expired:
+                    await path.unlink(missing_ok=True)
 
 
 class SessionConfig(ServerSideSessionConfig):
