@@ -19,6 +19,7 @@ found = {
         for edge in net.getEdges()
         for lane in edge.getLanes()
     ),
+    "box": list(net.getBoundary()),
     "turns": sum(len(out) for edge in net.getEdges() for out in edge.getOutgoing().values()),
 }
 print(json.dumps(found))

@@ -75,6 +75,8 @@ def test_sumo_finds_the_same(network: RoadNetwork, tmp_path: Path) -> None:
     assert close(found["junctions"], wanted, 1e-9)
     assert close(found["lanes"], lanes_of(network), 1e-9)
     assert found["turns"] == turns_of(network)
+    lines = np.concatenate([network.lane_curve(lane, 0.0) for lane in range(network.lanes)])
+    assert found["box"] == pytest.approx([*lines.min(axis=0), *lines.max(axis=0)], abs=1e-2)
 
 
 def test_sumo_runs_and_netconvert_reads(network: RoadNetwork, tmp_path: Path) -> None:

@@ -152,3 +152,12 @@ def test_arcs_stand_for_a_shape_within_the_tolerance(name: str, tolerance: float
     away = to_segments(wanted, curve)
     assert away.max() <= 1.05 * tolerance + 5e-3
     assert (away <= tolerance + 4e-3).mean() > 0.98
+
+
+@pytest.mark.parametrize(("rule", "ends"), [("RHT", [0.0, 90.0]), ("LHT", [90.0, 0.0])])
+def test_a_one_way_road_runs_as_the_traffic_of_its_country(rule: str, ends: list[float]) -> None:
+    """Where traffic keeps to the left, lanes on the right of the line run against it."""
+    text = whole(road("1", line(0.0, 0.0, 0.0, 90.0), RIGHT).replace("<road ", f'<road rule="{rule}" '))
+    (found,) = OpenDrive().read_map(text).roads
+    assert (found.forward, found.backward) == (1, 0)
+    assert found.line[:, 0].tolist() == ends

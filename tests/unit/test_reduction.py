@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from xml.sax.saxutils import quoteattr
 
 import pytest
 
@@ -187,6 +188,26 @@ def test_a_clothoid_of_opendrive_is_held() -> None:
     assert lacking(network) == []
     assert network.bent.all()
     assert losses.kept_share > 0.98
+
+
+@pytest.mark.parametrize(
+    ("width", "metres"),
+    [("6", 3.0), ("6.5 m", 3.25), ("20 ft", 3.048), ("20'", 3.048), ("20'6\"", 3.1242), ("wide", 3.2)],
+)
+def test_the_width_of_a_road_of_openstreetmap_may_be_in_feet(width: str, metres: float) -> None:
+    nodes = "<node id='1' lat='49' lon='9'/><node id='2' lat='49.001' lon='9'/>"
+    tag = f"<tag k='highway' v='residential'/><tag k='width' v={quoteattr(width)}/>"
+    text = f"<osm version='0.6'>{nodes}<way id='5'><nd ref='1'/><nd ref='2'/>{tag}</way></osm>"
+    (road,) = OpenStreetMap().read_map(text).roads
+    assert road.lane_width == pytest.approx(metres)
+
+
+def test_a_map_too_far_from_its_origin_is_refused_as_the_map_that_it_is() -> None:
+    far = {name: (5.4e6 + x, y) for name, (x, y) in CROSS.items()}
+    with pytest.raises(
+        InputError, match=r"road on: too far from the origin: got 5400000; expected .* 5.33333e\+06 m"
+    ):
+        reduced(ROADS, far)
 
 
 def test_openstreetmap_is_cut_where_ways_meet() -> None:

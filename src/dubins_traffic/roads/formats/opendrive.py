@@ -184,9 +184,10 @@ def _lanes(reader: Reader, road: Element) -> tuple[int, int, float]:
     begins = [reader.number(each, "s", 0.0) for each in sections]
     lengths = np.diff([*begins, max(reader.number(road, "length", 0.0), begins[-1])])
     section = sections[int(np.argmax(lengths))]
+    along_it, against_it = ("left", "right") if road.get("rule") == "LHT" else ("right", "left")
     sides = [
         [lane for lane in section.findall(f"{side}/lane") if lane.get("type") in FOR_CARS]
-        for side in ("right", "left")
+        for side in (along_it, against_it)
     ]
     widths = [
         reader.number(width, "a")

@@ -25,6 +25,9 @@ ROADS = TWO_LANES | {
 }  # fmt: skip
 """Kinds of ways that are roads."""
 _NUMBER = re.compile(r"\d{1,3}(\.\d{1,6})?")
+_FEET = re.compile(r"(\d{1,3}(?:\.\d{1,6})?)\s*(?:ft|')\s*(\d*)")
+_FOOT = 0.3048
+"""Metres."""
 
 
 class OpenStreetMap(ForeignFormat):
@@ -82,7 +85,7 @@ def _lanes(what: dict[str, str]) -> tuple[int, int, float, bool]:
         backward = round(_number(what.get("lanes:backward", ""))) or max(1, every - forward)
     if oneway in ("-1", "reverse"):
         forward, backward = backward, forward
-    width = _number(what.get("width", "")) / max(1, forward + backward)
+    width = _metres(what.get("width", "")) / max(1, forward + backward)
     access = what.get("motor_vehicle", what.get("vehicle", what.get("access", "yes")))
     return forward, backward, width or LANE_WIDTH, kind == "busway" or access == "no"
 
@@ -91,6 +94,12 @@ def _number(text: str) -> float:
     """Return the number with which a value begins, 0 if there is none."""
     found = _NUMBER.match(text)
     return float(found[0]) if found else 0.0
+
+
+def _metres(text: str) -> float:
+    """Return the metres that a value says, in metres unless it says feet: ``5.5``, ``5.5 m``, ``16 ft``, ``16'6"``."""
+    feet = _FEET.match(text)
+    return _FOOT * (float(feet[1]) + _number(feet[2]) / 12.0) if feet else _number(text)
 
 
 def _stops(osm: Osm, cuts: set[str]) -> set[str]:

@@ -32,7 +32,7 @@ class Lane(NamedTuple):
 
 def write_net(made: RoadMap) -> str:
     """Return the text of a SUMO network; each road becomes two edges, ``name`` and ``-name``."""
-    places = np.array([junction[:2] for junction in made.junctions.values()])
+    places = np.concatenate([road.line for road in made.roads])
     box = ",".join(number_text(float(each)) for each in (*places.min(axis=0), *places.max(axis=0)))
     root = Element("net", version="1.20", junctionCornerDetail="5", limitTurnSpeed="5.50")
     SubElement(root, "location", netOffset="0.00,0.00", convBoundary=box, origBoundary=box, projParameter="!")

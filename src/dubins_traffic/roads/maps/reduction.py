@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.roads.formats.rnd import LARGEST_POINT
 from dubins_traffic.roads.maps.choosing import Chooser
 from dubins_traffic.roads.maps.drafting import Draft, Drafter
 from dubins_traffic.roads.maps.fitting import line_of
@@ -73,6 +76,7 @@ def reduction(
     if own_lanes:
         settings = settings.with_lanes(width)
     scale = settings.scale if settings.scale is not None else 2.0 * settings.w / width
+    _check_place(road_map, scale, file)
     chooser, drafter = Chooser(road_map.roads), Drafter(road_map, settings, scale)
     dropped: dict[int, Reason] = {}
     work = MOST_WORK * len(road_map.roads)
@@ -100,6 +104,23 @@ def _check_length(roads: Sequence[Road], file: str | None) -> None:
     if sum(lengths) > LONGEST_MAP:
         expected = f"at most {LONGEST_MAP:g} m of roads"
         raise InputError("too large a map", file=file, value=round(sum(lengths)), expected=expected)
+
+
+def _check_place(road_map: RoadMap, scale: float, file: str | None) -> None:
+    """Raise InputError if a map lies farther from its origin than a network may at a scale."""
+    for road in road_map.roads:
+        away = float(np.abs(road.line).max())
+        if scale * away > LARGEST_POINT:
+            expected = (
+                f"coordinates up to {LARGEST_POINT / scale:g} m at this scale: move the map to its origin"
+            )
+            raise InputError(
+                "too far from the origin",
+                file=file,
+                field=f"road {road.name}",
+                value=round(away),
+                expected=expected,
+            )
 
 
 def usual_width(roads: Sequence[Road]) -> float:
