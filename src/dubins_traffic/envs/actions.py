@@ -80,7 +80,7 @@ class ActionMap:
         InputError
             If they are no actions.
         """
-        shares = np.zeros((len(np.atleast_1d(actions)), 2))
+        shares = np.zeros((len(actions) if np.iterable(actions) else 1, 2))
         self.put(actions, shares)
         if not np.isfinite(shares).all():
             raise _no_action(actions, "finite numbers")
