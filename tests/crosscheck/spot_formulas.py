@@ -1,7 +1,7 @@
 """What Spot says of formulas, by its own Python module; run by an interpreter that has it.
 
-Each line of the standard input is a request, each line written a list of its answer. ``{"read": TEXT}``: whether that is
-a formula to Spot, else its complaint; ``{"same": [TEXT, TEXT]}``: whether two formulas mean the same; ``{"solve":
+Each line of the standard input is a request, each line written a list of its answer. ``{"read": TEXT}``: whether that
+is a formula to Spot, else its complaint; ``{"same": [TEXT, TEXT]}``: whether two formulas mean the same; ``{"solve":
 [TEXT, OUTPUTS]}``: a Mealy machine that realizes a formula, in HOA: what ltlsynt does, by the same library.
 """
 

@@ -93,7 +93,9 @@ def test_a_batch_equals_its_trials_one_by_one(controller, more) -> None:
 
 def test_networks_of_their_own_and_a_batch_of_any_size_and_threads() -> None:
     agents = [{"type": "lawful", "name": "agent", "count": 3}]
-    config = configuration(network=OWN_NETWORKS, **{"e-agents": agents}, rules={"approach_distance": 0.6})
+    config = configuration(
+        network=OWN_NETWORKS, **{"e-agents": agents}, rules={"approach_distance": 0.6, "queue_distance": 0.6}
+    )
     sheets = [
         run_batch(config, trials=6, seed=SEED, batch=batch, threads=threads).sheet
         for batch, threads in ((1, 1), (4, 2), (64, 1))

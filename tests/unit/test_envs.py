@@ -18,6 +18,7 @@ from dubins_traffic.cars.state import Observation
 from dubins_traffic.controllers.scripted import Scripted
 from dubins_traffic.envs.episodes import Episodes, Levels
 from dubins_traffic.envs.formulas import with_formulas
+from dubins_traffic.envs.parallel import TrafficParallelEnv
 from dubins_traffic.envs.registration import NAMES
 from dubins_traffic.envs.terms import COSTS, TERMS
 from dubins_traffic.errors import DubinsTrafficError, InputError
@@ -218,3 +219,36 @@ def test_who_is_hit_while_it_stands_is_not_at_fault() -> None:
         assert (info["cost"]["1.collision"], info["cost"]["at_fault"]) == (1.0, fault)
         (collision,) = info["outcome"].score.collisions
         assert collision.at_fault == bool(fault)
+
+
+NO_ACTIONS = (0.5, [0.5], [0.5, 0.5, 0.5], [[0.5, 0.5]], [0.5, [0.5]], None, {})
+"""Values that are no element of the space of continuous actions."""
+
+
+@pytest.mark.parametrize("action", NO_ACTIONS)
+def test_an_action_of_another_shape_is_refused(action: Any) -> None:
+    one, many = single(), vector(2)
+    agents = TrafficParallelEnv({**SHORT, "e-agents": []})
+    for env in (one, many, agents):
+        env.reset(seed=1)
+    before = one.fleet.board.arrays["asked"].copy()
+    with pytest.raises(InputError, match=r"action: not an action.*Box, shape \(2,\), for each of 1"):
+        one.step(action)
+    with pytest.raises(InputError, match=r"action: not an action.*Box, shape \(2,\), for each of 2"):
+        many.step(action)
+    with pytest.raises(InputError, match=r"action: not an action.*Box, shape \(2,\), for each of 1"):
+        agents.step({"ego_0": action})
+    assert (one.fleet.board.arrays["asked"] == before).all()
+    assert one.step([0.5, 0.5])[4]["cost"]
+
+
+@pytest.mark.parametrize("action", [[3], 0.5, None, [[1]]])
+def test_a_discrete_action_of_another_shape_is_refused(action: Any) -> None:
+    one, many = single(action="discrete"), vector(1, action="discrete")
+    one.reset(seed=1)
+    many.reset(seed=1)
+    with pytest.raises(InputError, match=r"action: not an action"):
+        one.step(action)
+    if action != [3]:
+        with pytest.raises(InputError, match=r"action: not an action"):
+            many.step(action)

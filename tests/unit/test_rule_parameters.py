@@ -43,6 +43,8 @@ def test_a_mapping_changes_what_it_names() -> None:
         ({"turn_back": True}, "turn_back"),
         ({"crossing_degree": 3.0}, "crossing_degree"),
         ({"left_release": 0.1}, "left_release"),
+        ({"approach_distance": 2.0}, "queue_distance"),
+        ({"queue_distance": 0.4}, "queue_distance"),
         ({"edition": 1}, "edition"),
         ({"edition": 3}, "edition"),
         ({"edition": 2.0}, "edition"),

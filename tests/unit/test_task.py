@@ -56,6 +56,22 @@ def town(tmp_path: Path) -> str:
     return write(draw(load_config("town"), 0, 0), tmp_path / "town.json")
 
 
+def test_a_task_without_rules_says_so_beside_the_formulas(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, town: str
+) -> None:
+    told = tmp_path / "told.json"
+    assert main(["instance", "town", "-o", str(told)]) == 0
+    capsys.readouterr()
+    assert main(["spec", str(told)]) == 0
+    out, err = capsys.readouterr()
+    assert out.count("[]<>") == 4
+    assert "G" not in out
+    assert err.count("\n") == 1
+    assert "no rules of the road are in it" in err
+    assert main(["spec", town]) == 0
+    assert not capsys.readouterr().err
+
+
 def of(instance: Instance) -> Specification:
     return task(instance.problem, instance.names)
 

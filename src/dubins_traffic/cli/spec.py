@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dubins_traffic.cli import options
+from dubins_traffic.cli.faults import tell
 from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
@@ -106,6 +107,9 @@ def _instance(source: str) -> Instance:
     if isinstance(found, Record):
         return found.instance
     if isinstance(found, Instance):
+        if not found.problem.rules:
+            without = "no rules of the road are in it, so the task is its goals alone"
+            tell(f"{source}: {without} (`instance --full` keeps rules)")
         return found
     raise InputError("has no task", file=source, expected="a problem instance or a record")
 

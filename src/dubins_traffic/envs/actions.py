@@ -62,10 +62,15 @@ class ActionMap:
         InputError
             If they are no actions. Whether they are finite is not looked at.
         """
+        one: Any = self.space.shape
         try:
-            shares[:] = actions if self._table is None else self._table[self._chosen(actions)]
+            fits = np.shape(actions) == (len(shares), *one)
+            if fits:
+                shares[:] = actions if self._table is None else self._table[self._chosen(actions)]
         except (ValueError, TypeError):
-            raise _no_action(actions, f"{self.space.__class__.__name__} for each of {len(shares)}") from None
+            fits = False
+        if not fits:
+            raise _no_action(actions, f"{type(self.space).__name__}, shape {one}, for each of {len(shares)}")
 
     def commands(self, actions: Any) -> Floats:
         """Return the commands, (K, 2), speed in m/s and yaw rate in rad/s, of K actions.
@@ -75,7 +80,7 @@ class ActionMap:
         InputError
             If they are no actions.
         """
-        shares = np.zeros((len(actions), 2))
+        shares = np.zeros((len(actions) if np.iterable(actions) else 1, 2))
         self.put(actions, shares)
         if not np.isfinite(shares).all():
             raise _no_action(actions, "finite numbers")
@@ -83,7 +88,7 @@ class ActionMap:
 
     def _chosen(self, actions: Any) -> Any:
         chosen = np.asarray(actions)
-        if chosen.ndim != 1 or not np.issubdtype(chosen.dtype, np.integer):
+        if not np.issubdtype(chosen.dtype, np.integer):
             raise _no_action(actions, "an integer each")
         if len(chosen) and not (chosen.min() >= 0 and chosen.max() < len(SPEEDS) * len(TURNS)):
             raise _no_action(actions, f"from 0 to {len(SPEEDS) * len(TURNS) - 1}")

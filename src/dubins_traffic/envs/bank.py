@@ -12,6 +12,7 @@ from dubins_traffic.envs.between import Between
 from dubins_traffic.envs.formulas import FormulaWatch
 from dubins_traffic.envs.step_kernel import begin_trials, observe_trials, step_trials
 from dubins_traffic.envs.tables import Scale, StepTables, Stride
+from dubins_traffic.envs.terms import costs_of_rules
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.calls import bound
@@ -51,6 +52,7 @@ class Board:
             "terms": np.zeros((envs, len(weights))),
             "weighted": np.zeros((envs, len(weights))),
             "weights": weights,
+            "cost_of": costs_of_rules(),
             "reward": np.zeros(envs),
             "status": np.zeros(envs, dtype=np.int64),
             "flat": np.zeros((envs, settings.layout.size), dtype=np.float32),

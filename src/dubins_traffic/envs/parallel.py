@@ -179,7 +179,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         for name, action in actions.items():
             if name not in self.agents:
                 raise _no_agent("action", name, self.agents)
-            asked[0, self._ids.index(name)] = self.settings.actions.commands(np.asarray(action)[None])[0]
+            asked[0, self._ids.index(name)] = self.settings.actions.commands([action])[0]
         crew.step(asked, self.settings.frame_skip)
         ending = crew.group.endings[0]
         over, terminated = ending is not None, ending is not None and ending.end is not End.DURATION

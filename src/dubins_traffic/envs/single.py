@@ -102,7 +102,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         """Hold an action for `frame_skip` ticks; see `gymnasium.Env.step`."""
         if self.fleet.ended[0]:
             raise DubinsTrafficError("the episode is over, or has not begun: reset the environment")
-        self.fleet.step(np.asarray(action)[None])
+        self.fleet.step([action])
         board = self.fleet.board.arrays
         told = info.of_one(board["terms"][0], board["weighted"][0]) | self._states() | self._stepped_in()
         ended, terminated = bool(self.fleet.ended[0]), False

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.engine.batch_kernel import STATUS, World, run_trials
 from dubins_traffic.envs.tables import StepTables
-from dubins_traffic.envs.terms import AT_FAULT, COST_OF, TERM
+from dubins_traffic.envs.terms import AT_FAULT, TERM
 from dubins_traffic.kernels.ahead import fetch
 from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
@@ -205,12 +205,12 @@ def _charge(e: int, breaches: int, contacts: int, world: World, steps: StepTable
     """Count the ego's breaches and collisions among those found from the given rows on."""
     log, work = world.breach_log, world.work
     for k in range(breaches, log.filled[0]):
-        cost = COST_OF[log.row[k].rule]
+        cost = steps.cost_of[log.row[k].rule]
         if log.row[k].car == EGO and cost >= 0:
             steps.terms[e, TERM.BREACHES + cost] += 1.0
     for k in range(contacts, work.found[0]):
         if work.contact[k].car == EGO or work.contact[k].other == EGO:
-            steps.terms[e, TERM.BREACHES + COST_OF[RULE.COLLISION]] += 1.0
+            steps.terms[e, TERM.BREACHES + steps.cost_of[RULE.COLLISION]] += 1.0
             steps.terms[e, TERM.BREACHES + AT_FAULT] += 1.0 if _guilty(k, world) else 0.0
 
 

@@ -62,6 +62,8 @@ class StepTables(Tables):
         The same, with weights.
     weights : (T,)
         Their weights.
+    cost_of : (R,)
+        The cost that each rule is (`envs.terms.costs_of_rules`).
     reward : (E,)
         The reward.
     status : (E,)
@@ -78,6 +80,7 @@ class StepTables(Tables):
     terms: Floats
     weighted: Floats
     weights: Floats
+    cost_of: Ints
     reward: Floats
     status: Ints
     flat: npt.NDArray[np.float32] | Any

@@ -8,15 +8,13 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.rules.breach_log import RULES
 from dubins_traffic.scoring.verdict import EGO_RULES
 
 COSTS: Final = (*EGO_RULES, "at_fault")
 """Costs, by number: breaches of each rule of the ego's, and its collisions at fault."""
 AT_FAULT: Final = len(COSTS) - 1
-COST_OF: Final = tuple([EGO_RULES.index(rule) if rule in EGO_RULES else -1 for rule in RULES])
-"""The cost, by number, of each rule, by number; -1 of a rule that the ego can't break."""
 
 
 class _Term(NamedTuple):
@@ -50,6 +48,11 @@ WEIGHTS: Final[Mapping[str, float]] = {
 `comfort`: sum over ticks of the squared changes of speed and yaw rate, as shares of the car's bounds; `time`, seconds;
 the ego's breaches by rule (rule 1's collisions whoever is at fault); `at_fault`: collisions in which it is at fault.
 """
+
+
+def costs_of_rules() -> Ints:
+    """Return the cost, by number, of each rule, by number, (R,); -1 of a rule that the ego can't break."""
+    return np.array([EGO_RULES.index(rule) if rule in EGO_RULES else -1 for rule in RULES])
 
 
 def weights_of(given: Mapping[str, float] | None) -> Floats:

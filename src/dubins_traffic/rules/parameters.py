@@ -23,7 +23,8 @@ class RuleParameters:
     Raises
     ------
     InputError
-        If a value is not a finite number >= 0, or not whole where a count is asked; or if the edition is another one.
+        If a value is not a finite number >= 0, or not whole where a count is asked; if two contradict each other; or if
+        the edition is another one.
     """
 
     edition: int = EDITION
@@ -123,6 +124,13 @@ class RuleParameters:
                 field="left_release",
                 value=self.left_release,
                 expected=f"at most left_set ({self.left_set})",
+            )
+        if self.queue_distance < self.approach_distance:
+            raise InputError(
+                "`stopped` would be lost where it is gained",
+                field="queue_distance",
+                value=self.queue_distance,
+                expected=f"at least approach_distance ({self.approach_distance})",
             )
 
     @classmethod
