@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
+
+from dubins_traffic.errors import InputError
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,3 +24,15 @@ class Patience:
     settle: float = 0.2
     flood: int = 1000
     at_once: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse what is no time, such as `nan`, for which nobody would ever be silent."""
+        seconds(self.begin, "--begin")
+        seconds(self.silence, "--silence")
+
+
+def seconds(value: float, name: str) -> float:
+    """Return `value`, of the option `name`; InputError if it is not a positive finite number."""
+    if not 0.0 < value < math.inf:
+        raise InputError("not a positive number", file=name, value=value, expected="a number > 0")
+    return value
