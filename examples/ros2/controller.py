@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """An ego controller over ROS 2's topics, by DDS: round the goals in order, straight across country.
 
-It needs the library `cyclonedds` alone; a node of ROS 2 does the same with `rclpy`. Start it beside
+It needs this package with the extra `ros2`, and no ROS 2: `Graph` and the messages are of the package. A node of
+ROS 2 does the same with `rclpy`. Start it beside
 ``dubins-traffic ros2 run demo --lockstep``; it drives trial after trial until it is interrupted.
 """
 

@@ -104,7 +104,8 @@ class InputError(DubinsTrafficError):
         return self._text(str)
 
     def _text(self, say: Callable[[str], str]) -> str:
-        parts = [shown(say(part), LONGEST) for part in (self.file, self.field, self.problem) if part]
+        file = "''" if self.file == "" else self.file
+        parts = [shown(say(part), LONGEST) for part in (file, self.field, self.problem) if part]
         text = ": ".join(parts)
         if self.value is not _ABSENT:
             text += f": got {_short(self.value)}"

@@ -289,6 +289,9 @@ DOCUMENTS: dict[str, tuple[str, list[str], list[str]]] = {
 }
 
 OPTIONS: dict[str, tuple[list[str], list[str]]] = {
+    "silence that is no number": (["lines", "run", "demo", "--silence", "nan"], ["--silence", "nan", "> 0"]),
+    "time to begin below zero": (["lines", "run", "demo", "--begin", "-1"], ["--begin", "-1", "> 0"]),
+    "no name of a file": (["run", ""], ["dubins-traffic: '': a folder"]),
     "unknown command": (["drive"], ["drive"]),
     "unknown option": (["run", "demo", "--fast"], ["--fast"]),
     "no argument": (["run"], ["CONFIG"]),

@@ -173,6 +173,43 @@ def test_a_server_that_dies_or_hangs_ends_its_trial_by_name(sign: int, why: str)
     assert 29 <= result.ending.ticks <= 31
 
 
+def test_a_server_killed_while_it_starts_ends_its_trial_and_the_next_one_follows(tmp_path: Path) -> None:
+    file, out, real = tmp_path / "short.json", tmp_path / "out", installation()
+    file.write_text(
+        json.dumps(WANDERERS | {"duration": 2, "simulator": "gazebo", "laser": {"rays": 20}}),
+        encoding="utf-8",
+    )
+    first = tmp_path / "gzserver"
+    killed = f"[ -e {tmp_path}/once ] || {{ : > {tmp_path}/once; kill -KILL $$; }}"
+    first.write_text(f'#!/bin/sh\n{killed}\nexec {real.gzserver} "$@"\n')
+    first.chmod(0o755)
+    other = prefix.Installation(tmp_path, first, real.root)
+    prefix.write_manifest(tmp_path, first, own=real.root is None, version="11")
+    other.plugin.parent.mkdir(parents=True)
+    for own, found in ((other.plugin, real.plugin), (other.confinement, real.confinement)):
+        own.symlink_to(found)
+    if real.root is not None:
+        (tmp_path / "root").symlink_to(real.root)
+    done = command(
+        "run",
+        str(file),
+        "--trials",
+        "2",
+        "--records",
+        str(out),
+        "--json",
+        DUBINS_TRAFFIC_GAZEBO=str(tmp_path),
+    )
+    assert done.returncode == 1, done.stderr
+    assert [trial["end"] for trial in json.loads(done.stdout)["trials"]] == ["world_lost", "duration"]
+    lost = dt.load_record(out / "trial-0000.mcap")
+    assert lost.ending is not None
+    assert (lost.ending.ticks, len(lost.frames)) == (0, 1)
+    assert "ended by SIGKILL, while it started" in lost.ending.detail
+    assert (lost.frames.x[0, 0], lost.frames.y[0, 0]) == lost.instance.starts[0][:2]
+    assert dt.verify(out / "trial-0000.mcap").verified
+
+
 def test_a_port_in_use_is_named() -> None:
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))

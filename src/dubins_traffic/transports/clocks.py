@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from dubins_traffic.errors import InputError
+from dubins_traffic.transports.patience import seconds
 
 NEVER = -math.inf
 
@@ -16,7 +16,7 @@ class Lockstep:
     factor = 0.0
 
     def __init__(self, deadline: float = 5.0) -> None:
-        self._deadline = _seconds(deadline, "--deadline")
+        self._deadline = seconds(deadline, "--deadline")
 
     def start(self, period: float, now: float) -> None:
         """Nothing is timed."""
@@ -43,7 +43,7 @@ class RealTime:
     lockstep = False
 
     def __init__(self, factor: float = 1.0) -> None:
-        self.factor = _seconds(factor, "--factor")
+        self.factor = seconds(factor, "--factor")
         self._period = 1.0
         self._zero = 0.0
 
@@ -63,9 +63,3 @@ class RealTime:
     def shift(self, seconds: float) -> None:
         """Put off all that is to come."""
         self._zero += seconds
-
-
-def _seconds(value: float, name: str) -> float:
-    if not 0.0 < value < math.inf:
-        raise InputError("not a positive number", file=name, value=value, expected="a number > 0")
-    return value

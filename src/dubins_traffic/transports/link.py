@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Generator, Mapping
 from contextlib import contextmanager
 from time import monotonic
 from typing import TYPE_CHECKING, Any
@@ -315,7 +315,7 @@ class Link:
             self._settle()
 
     @contextmanager
-    def _standing_still(self) -> Iterator[None]:
+    def _standing_still(self) -> Generator[None]:
         began = monotonic()
         self._moving = False
         yield

@@ -31,9 +31,13 @@ class Patience:
     at_once: bool = False
 
     def __post_init__(self) -> None:
-        for name in ("begin", "silence"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise InputError(
-                    "not a time", file=f"--{name}", value=value, expected="seconds, a number > 0"
-                )
+        """Refuse what is no time, such as `nan`, for which nobody would ever be silent."""
+        seconds(self.begin, "--begin")
+        seconds(self.silence, "--silence")
+
+
+def seconds(value: float, name: str) -> float:
+    """Return `value`, of the option `name`; InputError if it is not a positive finite number."""
+    if not 0.0 < value < math.inf:
+        raise InputError("not a positive number", file=name, value=value, expected="a number > 0")
+    return value

@@ -1,4 +1,4 @@
-"""What transports show: states between two frames, where that is more often than once a tick, and what each car sees."""
+"""What transports show: states between frames, where that is more often than once a tick, and what cars see."""
 
 from __future__ import annotations
 

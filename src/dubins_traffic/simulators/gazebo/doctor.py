@@ -65,15 +65,17 @@ def drive_ahead(installation: Installation) -> None:
         If anything of this fails, or the car is not where it should be.
     """
     text = world([Pose(0.0, 0.0, 1.0, 0.0)], Disc(), (), 1.0 / STEPS, str(installation.plugin))
-    server = Server(installation, text)
+    server = None
     try:
+        server = Server(installation, text)
         rate = SPEED / WHEEL_RADIUS
         x, y = server.ask(Kind.STEP, np.array([STEPS, rate, rate]))[:2].tolist()
     except LostError as error:
-        why = server.explain(error)
+        why = str(error) if server is None else server.explain(error)
         raise InputError(f"Gazebo does not work here ({why})", file=str(installation.gzserver)) from error
     finally:
-        server.close()
+        if server is not None:
+            server.close()
     if abs(x - SPEED) > SLACK or abs(y) > SLACK:
         raise InputError(
             "Gazebo moves a car wrongly",

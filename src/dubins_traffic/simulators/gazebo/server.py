@@ -56,6 +56,8 @@ class Server:
     ------
     InputError
         If it can't be started; nothing is left running then.
+    LostError
+        If it was killed, or did not answer in time, while it started; nothing is left running then.
     """
 
     def __init__(
@@ -117,13 +119,16 @@ class Server:
             self._await(startup)
             version = self._link.receive(Kind.HELLO)[0]
         except LostError as error:
-            why = self.explain(error)
+            why, status = self.explain(error), self.process.poll()
+            unloaded = UNLOADED in self.log.read_bytes()
             self.close()
             if _in_use(port):
                 raise PortTakenError(
                     "Gazebo can't listen: the port is in use", field="port", value=port, expected="a free one"
                 ) from None
-            raise _not_started(why, installation) from None
+            if unloaded or (status or 0) > 0:
+                raise _not_started(why, installation) from None
+            raise LostError(f"{why}, while it started") from None
         if version != PROTOCOL:
             self.close()
             raise _not_started(f"its plugin speaks version {version:g}, not {PROTOCOL}", installation)

@@ -57,7 +57,8 @@ class Gazebo:
     Notes
     -----
     The server is told the rates of the wheels and nothing else; where the cars are is what the physics says. A server
-    that dies or does not answer ends its trial as `world_lost`. Equal trials are equal to the last bit on one
+    that dies or does not answer ends its trial as `world_lost`, after frame 0 at the starts if it does so while it
+    starts. Equal trials are equal to the last bit on one
     machine and installation, since each has a server of its own.
     """
 
@@ -82,6 +83,7 @@ class Gazebo:
         self._port = port
         self._patience = patience
         self.server: Server | None = None
+        self._lost = ""
 
     def reset(self, instances: Sequence[Instance]) -> State:
         """Start a server with the world of the only instance given, and place its cars.
@@ -89,7 +91,7 @@ class Gazebo:
         Raises
         ------
         InputError
-            If there are several instances, or the server can't be started.
+            If there are several instances, or the server can't be started: no trial could be run here.
         """
         if len(instances) != 1:
             raise InputError("Gazebo runs no batch", field="instances", value=len(instances), expected="one")
@@ -104,10 +106,7 @@ class Gazebo:
         plugin = str(self._installation.plugin)
         scenery = outlook(problem.network) if self._show else ()
         text = world(instance.starts, problem.car.body, problem.obstacles, step, plugin, scenery)
-        self.server = Server(self._installation, text, port=self._port, patience=self._patience)
-        if self._show:
-            self.server.show(self._installation)
-            self._began = monotonic()
+        self._lost = ""
         self._drive = vehicle.Drive.below(problem.car.body)
         self._rows = rows(pack_cars([problem.car]), cars, 1.0 / problem.rate)
         self._asked = np.zeros((2, cars))
@@ -116,7 +115,18 @@ class Gazebo:
         self._contacts = Contacts(instance, step)
         self._tick = 0
         self.state = State.zeros(1, cars)
-        self._take(self._ask(Kind.STATE))
+        for array, column in zip(self.state, zip(*instance.starts, strict=True), strict=False):
+            array[0] = column
+        try:
+            self.server = Server(self._installation, text, port=self._port, patience=self._patience)
+            if self._show:
+                self.server.show(self._installation)
+                self._began = monotonic()
+            self._take(self._ask(Kind.STATE))
+        except LostError as error:
+            self._lost = str(error)
+        except PeerError as error:
+            self._lost = error.detail
         return self.state
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
@@ -140,7 +150,14 @@ class Gazebo:
     def scan(self, car: int, rays: Floats, longest: float) -> Floats:
         """Return how far the rays (R, 2), unit vectors in the frame of `car`, go: (R,), at most `longest` metres."""
         message = np.concatenate(([car, vehicle.BUMPER, longest], rays.ravel()))
-        return self._ask(Kind.SCAN, message).copy()
+        try:
+            return self._ask(Kind.SCAN, message).copy()
+        except PeerError:
+            if self._tick:
+                raise
+            return np.full(
+                len(rays), longest
+            )  # a world that is only shown: the trial's first step names its end
 
     def close(self) -> None:
         """End the server."""
@@ -158,11 +175,13 @@ class Gazebo:
         return answer[BODY * cars :].reshape(-1, CONTACT)
 
     def _ask(self, kind: Kind, values: Floats | None = None) -> Floats:
+        if self._lost:
+            raise PeerError(End.WORLD_LOST.value, self._lost)
         if self.server is None:
             raise InputError("the simulator is closed", expected="`reset` before `step`")
         try:
             return self.server.ask(kind, values)
         except LostError as error:
-            why = self.server.explain(error)
+            self._lost = self.server.explain(error)
             self.close()
-            raise PeerError(End.WORLD_LOST.value, why) from None
+            raise PeerError(End.WORLD_LOST.value, self._lost) from None
