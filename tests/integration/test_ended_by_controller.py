@@ -252,7 +252,7 @@ def test_a_margin_that_is_no_number_is_refused(below: str, capsys: pytest.Captur
         falsify("junction", seconds=float("nan"))
     for name in ("begin", "silence"):
         assert main(["lines", "run", "junction", f"--{name}={below}"]) == 2
-        assert f"--{name}: not a time: got {below}" in capsys.readouterr().err
+        assert f"--{name}: not a positive number: got {below}" in capsys.readouterr().err
 
 
 @WHO

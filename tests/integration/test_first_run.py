@@ -3,11 +3,12 @@
 import os
 import subprocess
 import sys
-from contextlib import suppress
 from pathlib import Path
 from time import sleep
 
 import pytest
+
+from tests.companions import hurry
 
 COMMAND = [sys.executable, "-m", "dubins_traffic.cli"]
 RUN = ["run", "mc-small-4grid-agents2", "--controller", "simple", "--seed", "3"]
@@ -31,17 +32,6 @@ def kernels(cache: Path) -> set[str]:
 
 def asked(cache: Path) -> set[str]:
     return {path.name for path in cache.rglob("asked-*/*.json")}
-
-
-def hurry(cache: Path) -> None:
-    """Let the companion of a cache have the priority of others, if this user may: beside busy tests it gets no turn."""
-    for process in Path("/proc").glob("[0-9]*"):
-        with suppress(OSError):
-            if (
-                b"kernels.companion" in (process / "cmdline").read_bytes()
-                and os.fsencode(cache) in (process / "environ").read_bytes()
-            ):
-                os.setpriority(os.PRIO_PROCESS, int(process.name), 0)
 
 
 def wait_for_companion(cache: Path) -> None:

@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from dubins_traffic.cars.body import Body
+from dubins_traffic.kernels.angles import angles
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
 from dubins_traffic.kernels.tables import Tables
 
@@ -218,4 +219,4 @@ class Frames:
     @property
     def theta(self) -> Floats:
         """Headings in radians, (F, N)."""
-        return np.arctan2(self.s, self.c)
+        return np.copysign(angles(np.abs(self.s), self.c), self.s)

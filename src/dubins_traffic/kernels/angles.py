@@ -4,6 +4,10 @@ from __future__ import annotations
 
 from math import factorial
 
+import numpy as np
+
+from dubins_traffic.kernels.arrays import Floats
+
 TWO_OVER_PI = 0.6366197723675814
 # pi/2 in three parts of 33, 33 and 53 bits: n * PART is exact for |n| < 2**20.
 PART1 = 1.5707963267341256
@@ -79,3 +83,21 @@ def angle(y: float, x: float) -> float:
     if y > wide:
         found = HALF_PI - found
     return 2.0 * HALF_PI - found if x < 0.0 else found
+
+
+def angles(y: Floats, x: Floats) -> Floats:
+    """Return `angle` of arrays, bit for bit, on every processor: NumPy's own differs from one to another."""
+    wide = np.abs(x)
+    steep = y > wide
+    low, high = np.where(steep, wide, y), np.where(steep, y, wide)
+    t = np.divide(low, high, out=np.zeros_like(low), where=high != 0.0)
+    turn = t > TAN_EIGHTH_PI
+    t = np.where(turn, np.divide(low - high, low + high, out=np.zeros_like(low), where=high != 0.0), t)
+    z = t * t
+    over = z * (P0 + z * (P1 + z * (P2 + z * (P3 + z * P4))))
+    under = Q0 + z * (Q1 + z * (Q2 + z * (Q3 + z * (Q4 + z))))
+    found = t + t * (over / under)
+    found = np.where(turn, QUARTER_PI + found, found)
+    found = np.where(steep, HALF_PI - found, found)
+    found = np.where(x < 0.0, 2.0 * HALF_PI - found, found)
+    return np.where(high == 0.0, 0.0, found)

@@ -13,22 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels.angles import (
-    HALF_PI,
-    P0,
-    P1,
-    P2,
-    P3,
-    P4,
-    Q0,
-    Q1,
-    Q2,
-    Q3,
-    Q4,
-    QUARTER_PI,
-    TAN_EIGHTH_PI,
-    sincos,
-)
+from dubins_traffic.kernels.angles import angles, sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.chain import Corner, Piece, chain
 from dubins_traffic.roads.formats.rnd import Segment
@@ -238,24 +223,6 @@ def sides(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> l
         (ax, ay), (bx, by) = (own[0][:2], own[-1][:2]) if own else ((x1, y1), (x0, y0))
         found.append((ax - x0, ay - y0, x1 - bx, y1 - by))
     return found
-
-
-def angles(y: Floats, x: Floats) -> Floats:
-    """Return `kernels.angles.angle` of arrays, bit for bit."""
-    wide = np.abs(x)
-    steep = y > wide
-    low, high = np.where(steep, wide, y), np.where(steep, y, wide)
-    t = np.divide(low, high, out=np.zeros_like(low), where=high != 0.0)
-    turn = t > TAN_EIGHTH_PI
-    t = np.where(turn, np.divide(low - high, low + high, out=np.zeros_like(low), where=high != 0.0), t)
-    z = t * t
-    over = z * (P0 + z * (P1 + z * (P2 + z * (P3 + z * P4))))
-    under = Q0 + z * (Q1 + z * (Q2 + z * (Q3 + z * (Q4 + z))))
-    found = t + t * (over / under)
-    found = np.where(turn, QUARTER_PI + found, found)
-    found = np.where(steep, HALF_PI - found, found)
-    found = np.where(x < 0.0, 2.0 * HALF_PI - found, found)
-    return np.where(high == 0.0, 0.0, found)
 
 
 def turned(vectors: Floats, c: float, s: float) -> Floats:
