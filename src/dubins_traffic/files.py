@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import gzip
 import io
 import os
@@ -15,7 +14,14 @@ import zlib
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
-from dubins_traffic.errors import InputError
+from dubins_traffic.errors import DubinsTrafficError, InputError
+
+try:
+    import fcntl
+except ImportError as error:
+    raise DubinsTrafficError(
+        "this system has no locks for files (fcntl): Linux or macOS is needed"
+    ) from error
 
 STANDARD = "-"
 MOST_BYTES = 1 << 28

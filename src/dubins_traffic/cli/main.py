@@ -64,6 +64,7 @@ def _concluded(arguments: list[str]) -> int:
     from dubins_traffic.cli import faults
 
     faults.open_streams()
+    faults.forget_no_width()
     try:
         from dubins_traffic.cli.commands import app
 

@@ -303,15 +303,20 @@ def _folder(phase: Seeded) -> Path:
     return phase.folder
 
 
-def _cipher(key: bytes, salt: bytes) -> Any:
+def cipher_class() -> Any:
+    """Return the class of the cipher; MissingExtraError without the extra `competition`."""
     try:
         from cryptography.hazmat.primitives.ciphers.aead import AESGCM
     except ImportError as error:
         raise MissingExtraError("sealed seeds", "competition") from error
+    return AESGCM
+
+
+def _cipher(key: bytes, salt: bytes) -> Any:
     derived = hashlib.scrypt(
         checked_key(key), salt=salt, n=COST, r=_BLOCK, p=_LANES, maxmem=_MEMORY, dklen=32
     )
-    return AESGCM(derived)
+    return cipher_class()(derived)
 
 
 def _bound(head: Mapping[str, object]) -> bytes:
