@@ -6,9 +6,11 @@ The public names below are loaded when they are first used, so that importing th
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # without the module `typing`: the program `dubins-traffic` hears Ctrl-C the sooner
+    from typing import Any
+
     from dubins_traffic.campaign.results import CampaignResults, load_results
     from dubins_traffic.campaign.run_campaign import run_campaign
     from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import gzip
 import io
 import os
@@ -15,7 +14,14 @@ import zlib
 from collections.abc import Callable, Generator, Sequence
 from pathlib import Path
 
-from dubins_traffic.errors import InputError
+from dubins_traffic.errors import DubinsTrafficError, InputError
+
+try:
+    import fcntl
+except ImportError as error:
+    raise DubinsTrafficError(
+        "this system has no locks for files (fcntl): Linux or macOS is needed"
+    ) from error
 
 STANDARD = "-"
 MOST_BYTES = 1 << 28
@@ -273,7 +279,7 @@ def packed(*suffixes: str) -> tuple[str, ...]:
     return (*suffixes, *(f"{suffix}{GZIP}" for suffix in suffixes))
 
 
-def make_folder(folder: Path, what: str) -> None:
+def make_folder(folder: Path, what: str, *, begun: bool = False) -> None:
     """Make a folder unless it is there.
 
     Parameters
@@ -282,12 +288,16 @@ def make_folder(folder: Path, what: str) -> None:
         Where.
     what : str
         What it is to hold, for the message.
+    begun : bool
+        Whether what it holds is to be gone on with, so that it must be there.
 
     Raises
     ------
     InputError
         If that can't be done.
     """
+    if begun and not folder.is_dir():
+        raise InputError("nothing to go on with", file=str(folder), expected=f"a folder that holds {what}")
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:

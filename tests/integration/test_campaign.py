@@ -69,6 +69,7 @@ def await_group(group: int) -> None:
 
 def test_ten_kills_lose_and_repeat_nothing_that_was_finished(tmp_path: Path, table: bytes) -> None:
     file, out = written(tmp_path, campaign()), tmp_path / "out"
+    out.mkdir()  # what is gone on with must be there, and the first kill may come before it is made
     chance = random.Random(2016)
     finished = 0
     for _ in range(10):
@@ -195,3 +196,56 @@ def test_two_runs_do_not_share_a_folder(tmp_path: Path) -> None:
         process.kill()
     assert second.returncode == 2
     assert f"{out}: in use by another process" in second.stderr
+
+
+PATIENT = """
+from pathlib import Path
+import time
+
+HERE = Path(__file__).parent
+
+
+class Patient:
+    def start(self, problem):
+        with (HERE / "begun").open("a") as begun:
+            begun.write("x")
+
+    def act(self, observation):
+        time.sleep(0.0 if (HERE / "go").exists() else 0.05)
+        return 0.3, 0.1
+"""
+
+
+def test_trials_of_a_slow_controller_are_kept_one_by_one(tmp_path: Path) -> None:
+    """A chunk of them was lost at Ctrl-C: none of 48 was kept after a third of the time."""
+    document = campaign(
+        controllers=["slow.py:Patient"], trials=24, factors={"duration": [1.0, 2.0]}, chunk=24
+    )
+    file = written(tmp_path, document)
+    (tmp_path / "slow.py").write_text(PATIENT)
+    out = tmp_path / "out"
+    with subprocess.Popen(
+        command(file, out, "--workers", "2"), stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        while kept(out) < 4 and process.poll() is None:
+            time.sleep(0.01)
+        process.send_signal(signal.SIGINT)
+        told = process.communicate()[1]
+    before = kept(out)
+    begun = len((tmp_path / "begun").read_text())
+    assert process.returncode == 1
+    assert f"interrupted; {before} of 48 trials are kept, --resume goes on" in told
+    assert 4 <= before < 48
+    assert begun - before <= 4  # each of the two workers was at one, and had one in waiting
+    (tmp_path / "go").touch()
+    whole = succeed(file, out, "--workers", "2", "--resume")
+    assert len((tmp_path / "begun").read_text()) == begun + 48 - before
+    assert succeed(file, tmp_path / "again", "--workers", "1") == whole
+
+
+def test_a_mistyped_folder_holds_nothing_to_go_on_with(tmp_path: Path) -> None:
+    file = written(tmp_path, campaign())
+    done = run(file, tmp_path / "mistyped", "--resume")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "mistyped: nothing to go on with; expected a folder that holds a campaign" in done.stderr
+    assert not (tmp_path / "mistyped").exists()

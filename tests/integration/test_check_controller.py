@@ -3,6 +3,7 @@
 import json
 import os
 import shlex
+import signal
 import subprocess
 import sys
 import time
@@ -14,6 +15,7 @@ import pytest
 
 from dubins_traffic.checkup import checkup, over_transport
 from dubins_traffic.checkup.checkup import Checkup, check_controller
+from dubins_traffic.checkup.passes import FIRST
 from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.checkup.watch import Waited, see_off
 from dubins_traffic.cli.main import main
@@ -61,6 +63,19 @@ class Deadly(Good):
 class Killed(Good):
     def start(self, problem):
         os.kill(os.getpid(), 9)
+
+class Asleep(Good):
+    def act(self, observation):
+        time.sleep(1e6)
+
+class Stubborn(Good):
+    def act(self, observation):
+        print("asked", flush=True)
+        while True:
+            try:
+                time.sleep(1e6)
+            except BaseException:
+                print("caught", flush=True)
 
 class Lingering(Good):
     def close(self):
@@ -136,6 +151,32 @@ def test_a_controller_that_kills_its_process_in_start(faulty: str) -> None:
     found = check_controller(f"{faulty}:Killed")
     assert not verdicts(found)["starts"]
     assert "the process was ended by SIGKILL" in found.findings[0].detail
+
+
+def test_an_answer_that_never_comes_is_a_failed_check_and_the_end(faulty: str) -> None:
+    found = check_controller(f"{faulty}:Asleep")
+    details = {finding.check: finding.detail for finding in found.findings if not finding.passed}
+    said = f"two goals and two e-agents: deadline act took more than {FIRST} s at tick 0; 6 of 7 trials were not run"
+    assert details["survives odd instances"] == said
+    assert details.keys() == {"survives odd instances", "answers in time", "deterministic"}
+
+
+def test_nor_does_one_end_it_that_catches_everything(faulty: str) -> None:
+    found = check_controller(f"{faulty}:Stubborn")
+    details = {finding.check: finding.detail for finding in found.findings if not finding.passed}
+    assert "died at tick 0: was ended: nothing more after 60 s" in details["survives odd instances"]
+
+
+def test_ctrl_c_ends_it_with_a_line(faulty: str) -> None:
+    words = [COMMAND, "check-controller", f"{faulty}:Stubborn"]
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, start_new_session=True) as process:
+        assert process.stderr is not None
+        assert process.stderr.readline() == "asked\n"
+        os.killpg(process.pid, signal.SIGINT)
+        assert (
+            process.stderr.read() == "dubins-traffic: interrupted\n"
+        )  # the process of the course has ended, too
+        assert process.wait() == 1
 
 
 def test_what_a_controller_leaves_behind_is_no_clean_end(faulty: str) -> None:

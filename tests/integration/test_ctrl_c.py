@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -121,6 +122,108 @@ def test_one_that_comes_in_other_words_is_one(
 def test_while_the_program_begins(count: int) -> None:
     done = ran(AT_AN_IMPORT, str(count), "run", "demo", "--trials", "1")
     assert (done.returncode, done.stdout, done.stderr) == (1, "", "dubins-traffic: interrupted\n")
+
+
+BEFORE_IT_LISTENS = """
+import signal, sys
+
+
+def hear(event, given):
+    if event == "import" and given[0] == sys.argv[1]:
+        signal.raise_signal(signal.SIGINT)
+
+
+sys.addaudithook(hear)
+from dubins_traffic.cli.__main__ import main
+"""
+
+
+@pytest.mark.parametrize("module", ["dubins_traffic.cli.main", "threading", "dubins_traffic.runs"])
+def test_before_the_program_listens(module: str) -> None:
+    done = ran(BEFORE_IT_LISTENS, module)
+    assert (done.returncode, done.stdout, done.stderr) == (
+        -signal.SIGINT,
+        "",
+        "dubins-traffic: interrupted\n",
+    )
+
+
+STUBBORN = """
+import sys, time
+
+
+class Stubborn:
+    def start(self, problem):
+        pass
+
+    def act(self, observation):
+        while True:
+            try:
+                print("asked", file=sys.stderr, flush=True)
+                time.sleep(600)
+            except BaseException as error:
+                print("caught", type(error).__name__, file=sys.stderr, flush=True)
+"""
+CAMPAIGN = """
+version = 0
+name = "stubborn"
+configurations = ["demo"]
+trials = 2
+seed = 0
+controllers = ["mine.py:Stubborn"]
+"""
+HERE = {
+    "run": ["run", "demo", "--controller", "mine.py:Stubborn"],
+    "batch": ["batch", "demo", "--controller", "mine.py:Stubborn", "--trials", "2"],
+    "falsify": ["falsify", "junction", "--controller", "mine.py:Stubborn", "--trials", "2"],
+}
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("name", sorted(HERE))
+def test_the_second_ends_a_program_whatever_a_controller_catches(
+    name: str, number: signal.Signals, tmp_path: Path
+) -> None:
+    (tmp_path / "mine.py").write_text(STUBBORN)
+    words = [sys.executable, "-m", "dubins_traffic.cli", *HERE[name]]
+    with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        wait_for("asked", process)
+        process.send_signal(number)
+        wait_for("caught KeyboardInterrupt", process)
+        process.send_signal(number)
+        assert process.wait() == -number
+
+
+def test_the_second_ends_a_campaign_and_its_workers(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(STUBBORN)
+    (tmp_path / "c.toml").write_text(CAMPAIGN)
+    words = [
+        sys.executable,
+        "-m",
+        "dubins_traffic.cli",
+        "campaign",
+        "run",
+        "c.toml",
+        "-o",
+        "c",
+        "--workers",
+        "1",
+    ]
+    with subprocess.Popen(words, cwd=tmp_path, stderr=subprocess.PIPE, text=True) as process:
+        wait_for("asked", process)
+        while process.poll() is None:  # two that come at once are heard as one
+            process.send_signal(signal.SIGINT)
+            time.sleep(0.05)
+        assert process.wait() == -signal.SIGINT
+        assert process.stderr is not None
+        process.stderr.read()  # it ends when the worker, who holds the other end, too, has ended
+
+
+def wait_for(line: str, process: subprocess.Popen[str]) -> None:
+    assert process.stderr is not None
+    assert line in iter(lambda: process.stderr.readline().strip() if process.stderr else "", ""), (
+        "it has ended"
+    )
 
 
 def test_when_all_is_done() -> None:

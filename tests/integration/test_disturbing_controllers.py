@@ -94,3 +94,68 @@ def test_a_signal_while_workers_begin_is_told_in_a_line(number, place):
     assert process.returncode == 1, said
     assert said.count("\n") == 1, said
     assert "interrupted; 0 of " in said
+
+
+COMPILED = """
+import ctypes
+import os
+
+LIBRARY = ctypes.CDLL(None)
+
+
+class Compiled:
+    def start(self, problem):
+        LIBRARY.printf(b"held back until the end\\n")
+        LIBRARY.puts(b"put")
+        os.write(1, b"written\\n")
+
+    def act(self, observation):
+        return 0.3, 0.1
+"""
+
+
+def test_what_compiled_code_prints_is_no_result(tmp_path: Path) -> None:
+    (tmp_path / "mine.py").write_text(COMPILED)
+    words = [sys.executable, "-m", "dubins_traffic.cli", "run", "demo", "--trials", "1", "--json"]
+    done = subprocess.run(
+        [*words, "--controller", "mine.py:Compiled"],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert len(json.loads(done.stdout)["trials"]) == 1
+    for said in ("held back until the end", "put", "written"):
+        assert f"{said}\n" in done.stderr
+
+
+def test_no_width_of_a_terminal_hides_the_scores() -> None:
+    words = [
+        sys.executable,
+        "-m",
+        "dubins_traffic.cli",
+        "run",
+        "demo",
+        "--trials",
+        "1",
+        "--controller",
+        "simple",
+    ]
+    shown = [
+        subprocess.run(words, env={**os.environ, "COLUMNS": width}, capture_output=True, check=True).stdout
+        for width in ("0", "-3", "wide", "")
+    ]
+    assert b"rounds" in shown[0]
+    assert len(set(shown)) == 1
+
+
+def test_a_system_without_locks_is_refused_with_a_word() -> None:
+    code = (
+        "import sys; sys.modules['fcntl'] = None\nfrom dubins_traffic.cli.main import main\nsys.exit(main())"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code, "list", "agents"], capture_output=True, text=True, check=False
+    )
+    said = "dubins-traffic: this system has no locks for files (fcntl): Linux or macOS is needed\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", said)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from dubins_traffic.campaign.factors import Scalar
@@ -20,6 +20,8 @@ TRIAL = 1_000
 """Cost of beginning and scoring a trial, in car-steps."""
 ASKED = 200
 """Least cost of asking a controller in Python once, in car-steps."""
+KEPT_S = 1.0
+"""Seconds that a controller in Python may take for a chunk: what is finished is kept that often, or trial by trial."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,12 +117,47 @@ def cut(
                 left -= count * each
 
 
+class Pace:
+    """Cuts chunks to what their controllers, of which nobody knows how long they think, do in about `KEPT_S`.
+
+    The first trials of a controller in Python are chunks of their own.
+    """
+
+    def __init__(self) -> None:
+        self._answer_s: dict[str, float] = {COMPILED: 0.0}
+
+    def pieces(self, chunks: Iterable[Chunk]) -> Iterator[Chunk]:
+        """Yield the trials of `chunks`, in order, in chunks that are no larger."""
+        for chunk in chunks:
+            number = chunk.number
+            while number < chunk.end:
+                end = min(chunk.end, number + self._trials(chunk))
+                yield chunk.part(number, end)
+                number = end
+
+    def note(self, chunk: Chunk, answer_s: float) -> None:
+        """Note how long the controller of a chunk took for an answer, seconds."""
+        self._answer_s[chunk.controller] = answer_s
+
+    def _trials(self, chunk: Chunk) -> int:
+        answer_s = self._answer_s.get(chunk.controller)
+        if answer_s is None:
+            return 1
+        each_s = answer_s * ticks(chunk.configuration)
+        return max(1, int(KEPT_S / each_s)) if each_s * chunk.count > KEPT_S else chunk.count
+
+
+def ticks(settled: Configuration) -> float:
+    """Return the ticks of the longest trial of a configuration."""
+    settings = settled.settings
+    seconds = settings.duration_bounds[1] if settings.duration is None else settings.duration
+    return seconds * settings.rate
+
+
 def cost(cell: Cell, controller: str) -> float:
     """Return an estimate of the cost of a trial, in car-steps of the compiled tick."""
-    settings = cell.settled.settings
-    seconds = settings.duration_bounds[1] if settings.duration is None else settings.duration
     python_cost = 0 if controller == COMPILED else ASKED
-    return TRIAL + seconds * settings.rate * (1 + len(cell.settled.agents) + python_cost)
+    return TRIAL + ticks(cell.settled) * (1 + len(cell.settled.agents) + python_cost)
 
 
 def _trials(left: float, each: float) -> int:

@@ -8,7 +8,7 @@ from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
-from dubins_traffic.campaign import manifest, table
+from dubins_traffic.campaign import manifest, rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.records import FOLDER as RECORDS
@@ -130,10 +130,14 @@ def opened(path: Path, campaign: Campaign, *, resume: bool, records: str | None)
     Raises
     ------
     InputError
-        If the folder holds something else, another campaign or a changed one, is in use or can't be written.
+        If the folder holds something else, another campaign or a changed one, is in use or can't be written; if there
+        is nothing to go on with.
+    MissingExtraError
+        Without the extra `campaign`; nothing is made then.
     """
+    rows.arrow()
     read_keep(records or Keep.NONE)
-    make_folder(path, "a campaign")
+    make_folder(path, "a campaign", begun=resume)
     with locked(path):
         known = manifest.read(path)
         if known is None:

@@ -92,6 +92,12 @@ def part_schema(metrics: Sequence[Column] = ()) -> Any:
     return made.schema([(name, getattr(made, names.get(kind, kind))()) for name, kind in types.items()])
 
 
+def answer_s(part: bytes) -> float:
+    """Return how long an answer took in the trials of a part, seconds, on average; 0 if nobody was asked."""
+    found = arrow().parquet.read_table(BytesIO(part), columns=["act_mean_s"])["act_mean_s"]
+    return arrow().compute.mean(found).as_py() or 0.0
+
+
 def encoded(found: Columns, metrics: Sequence[Column] = ()) -> bytes:
     """Return the rows of a chunk as the bytes of its Parquet file, a part of the campaign's table."""
     made = arrow()

@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dubins_traffic.campaign import folder as folders
+from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign, load_campaign
-from dubins_traffic.campaign.chunks import Chunk
+from dubins_traffic.campaign.chunks import Chunk, Pace
 from dubins_traffic.campaign.engines import Engine
 from dubins_traffic.campaign.folder import Folder
 from dubins_traffic.campaign.pool import Pool
@@ -96,8 +97,10 @@ def run_left(own: Folder, engine: Engine[Chunk], progress: Progress | None = Non
     """
     done = own.done()
     count = sum(end - first for first, end in done)
-    for chunk, part in carry_out(engine, folders.remaining(own.campaign.chunks(), done)):
+    pace = Pace()
+    for chunk, part in carry_out(engine, pace.pieces(folders.remaining(own.campaign.chunks(), done))):
         own.keep(chunk, part)
+        pace.note(chunk, rows.answer_s(part))
         count += chunk.count
         if progress is not None:
             progress(count, own.campaign.total)

@@ -85,7 +85,8 @@ def check_controller(controller: str, over: str | None = None) -> Checkup:
     """
     if over is None:
         controllers.load(controller)
-        first, second = run_here(controller, 1), run_here(controller, 2)
+        first = run_here(controller, 1)
+        second = Pass(lost=first.lost) if first.hung else run_here(controller, 2)
     else:
         first, second = run_over(over, controller)
     answers = [answer for drive in first.drives for answer in drive.answers_s]

@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 import math
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
@@ -19,11 +22,14 @@ from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.checkup.watch import Place, Waited, ended, see_off
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.problem.instance import Problem
-from dubins_traffic.protocols import Closes, Controller
+from dubins_traffic.protocols import Closes, Controller, End
+from dubins_traffic.runs.jobs import deaf_to_interrupts
 from dubins_traffic.runs.single import Result, run_trial
 
 DEADLINE = 5.0
 """Seconds for one answer, after which the trial ends."""
+FIRST = 30.0
+"""Seconds for one answer in the rehearsal, in which controllers compile; after a later one there is no course."""
 ERRORS = 2
 """The file descriptor to which a controller's own output goes; standard output is reserved for the results."""
 REHEARSAL = 0.2
@@ -55,11 +61,16 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Pass:
-    """One pass over the course; `farewell`: what was wrong with the program's end, `lost`: what broke it off."""
+    """One pass over the course.
+
+    `farewell` is what was wrong with the program's end, `lost` what broke it off, `hung` whether that was for want of
+    an answer.
+    """
 
     drives: list[Drive] = field(default_factory=list[Drive])
     farewell: str = ""
     lost: str = ""
+    hung: bool = False
 
 
 def driven(name: str, result: Result, answers: list[float], commands: list[tuple[float, float]]) -> Drive:
@@ -120,29 +131,49 @@ def run_here(controller: str, number: int) -> Pass:
         out, place = Path(folder) / "drives", Path(folder) / "place"
         out.touch()
         with Place.made(place) as reached:
-            command = [sys.executable, "-m", __spec__.name, controller, str(out), str(place)]
-            environment = {**os.environ, "PYTHONHASHSEED": str(number)}
-            with subprocess.Popen(command, env=environment, stdin=subprocess.DEVNULL, stdout=ERRORS) as child:
+            with _begun(controller, number, out, place) as child:
                 try:
                     lost = _await(child, out, reached)
-                finally:
-                    farewell = see_off(child.pid, child.poll)
-                    if farewell:
-                        child.kill()
-                    status = child.wait()
+                except BaseException:
+                    child.kill()
+                    raise
+                farewell = see_off(child.pid, child.poll)
+                if farewell:
+                    child.kill()
+                status = child.wait()
             drives = [Drive(**json.loads(line)) for line in out.read_text(encoding="utf-8").splitlines()]
             if len(drives) == len(scenarios()):
                 return Pass(drives, farewell or ("" if status == 0 else f"the process {ended(status)}"))
+            late = reached.trial < 0 and bool(drives)
+            hung = late or bool(lost)
             lost = lost or f"the process {ended(status)}"
-            died = None if reached.trial != len(drives) else _died(reached, lost)
-    return Pass([*drives, died] if died is not None else drives, lost=lost)
+            died = None if max(0, reached.trial) != len(drives) else _died(reached, lost)
+    return Pass([*drives, died] if died is not None else drives, lost=lost, hung=hung)
+
+
+@contextmanager
+def _begun(controller: str, number: int, out: Path, place: Path) -> Generator[subprocess.Popen[bytes]]:
+    """Begin the process of a pass: it is deaf to Ctrl-C, which is for its parent, and ends with its parent."""
+    environment = {**os.environ, "PYTHONHASHSEED": str(number)}
+    watched, held = os.pipe()
+    try:
+        command = [sys.executable, "-m", __spec__.name, controller, str(out), str(place), str(watched)]
+        with deaf_to_interrupts():
+            child = subprocess.Popen(
+                command, env=environment, stdin=subprocess.DEVNULL, stdout=ERRORS, pass_fds=(watched,)
+            )
+        with child:
+            yield child
+    finally:
+        os.close(watched)
+        os.close(held)
 
 
 def _died(reached: Place, lost: str) -> Drive:
     """Return the trial in which the process died."""
-    name, tick = list(scenarios())[reached.trial], reached.tick
+    begin = None if math.isnan(reached.begin) else reached.begin
+    name, tick = list(scenarios())[max(0, reached.trial)], -1 if begin is None else reached.tick
     where = "before its first answer" if tick < 0 else f"at tick {tick}"
-    begin = reached.begin if tick >= 0 else None
     return Drive(name, DIED, f"{where}: {lost}", max(0, tick), begin, [], [])
 
 
@@ -158,17 +189,21 @@ def _await(child: subprocess.Popen[bytes], out: Path, reached: Place) -> str:
         now = (len(out.read_bytes().splitlines()), reached.trial, reached.tick)
         if now != seen:
             waited, seen = Waited(child.pid), now
-        if waited.seconds() > (PATIENCE if seen[1] >= 0 else COMPILING):
+        if waited.seconds() > (PATIENCE if seen[1:] != (-1, -1) else COMPILING):
             child.kill()
             return f"was ended: nothing more after {PATIENCE:g} s"
     return ""
 
 
-def _main(controller: str, out: str, place: str) -> None:
+def _main(controller: str, out: str, place: str, parent: str) -> None:
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
+    threading.Thread(target=_end_with_parent, args=(int(parent),), daemon=True).start()
     instances = scenarios()
-    rehearsal = replace(next(iter(instances.values())), duration=REHEARSAL)
-    run_trial(rehearsal, controllers.load(controller))  # what is compiled on a first run is not measured
     with Place.opened(Path(place)) as reached, Path(out).open("a", encoding="utf-8") as file:
+        late = _rehearse(controller, reached)
+        if late is not None:
+            file.write(json.dumps(asdict(late)) + "\n")
+            return
         for number, (name, instance) in enumerate(instances.items()):
             reached.put(number, math.nan, -1)
             witness = Witness(controllers.load(controller), partial(reached.put, number))
@@ -176,6 +211,31 @@ def _main(controller: str, out: str, place: str) -> None:
             drive = driven(name, result, witness.answers, witness.commands)
             file.write(json.dumps(asdict(drive)) + "\n")
             file.flush()
+
+
+def _rehearse(controller: str, reached: Place) -> Drive | None:
+    """Drive a moment, so that what is compiled on a first run is not measured; return it if an answer never came.
+
+    Built-in controllers take as long as they need, since compiling them may; all others have `FIRST` for an answer.
+    """
+    name, instance = next(iter(scenarios().items()))
+    rehearsal = replace(instance, duration=REHEARSAL)
+    shield = controllers.shield_of(controller)
+    if (controller if shield is None else shield[0]) in controllers.names():
+        run_trial(rehearsal, controllers.load(controller))
+        return None
+    run_trial(rehearsal, controllers.load("simple"))
+    reached.put(-1, math.nan, 0)
+    witness = Witness(controllers.load(controller), partial(reached.put, -1))
+    result = run_trial(rehearsal, witness, deadline=FIRST)
+    late = result.ending.end == End.DEADLINE
+    return driven(name, result, witness.answers, witness.commands) if late else None
+
+
+def _end_with_parent(held: int) -> None:
+    """Wait until the parent, which holds the other end of a pipe, has ended, and end at once."""
+    os.read(held, 1)
+    os._exit(1)
 
 
 if __name__ == "__main__":

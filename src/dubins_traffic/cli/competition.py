@@ -85,6 +85,7 @@ def seal(
     from dubins_traffic.competition import sealing
     from dubins_traffic.competition.keys import make_key_file
 
+    sealing.cipher_class()
     own = _phase(file, phase)
     if key_file is not None and not Path(key_file).exists():
         make_key_file(Path(key_file), own.folder)

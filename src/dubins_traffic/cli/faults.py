@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import sys
 import threading
@@ -26,6 +27,8 @@ FAILED: Final = 1
 WRONG_INPUT: Final = 2
 
 PROGRAM: Final = "dubins-traffic"
+_OUTPUT, _ERRORS = 1, 2
+"""Descriptors of the standard streams."""
 COMPLETION: Final = "_DUBINS_TRAFFIC_COMPLETE"
 """Name of the environment variable by which a shell asks for completions."""
 
@@ -109,6 +112,13 @@ def open_streams() -> None:
             setattr(sys, name, os.fdopen(os.open(os.devnull, os.O_RDWR), mode))
 
 
+def forget_no_width() -> None:
+    """Forget a width of the terminal that is none, as of COLUMNS=0, at which nothing would be shown."""
+    width = os.environ.get("COLUMNS", "")
+    if width and not (width.isdecimal() and int(width)):
+        del os.environ["COLUMNS"]
+
+
 @contextlib.contextmanager
 def debugging(wanted: bool) -> Generator[None]:
     """Let whole tracebacks of controllers be shown in the body, if `wanted`, also by processes that begin in it."""
@@ -129,8 +139,28 @@ def controllers_drive() -> Generator[None]:
     What they print goes to standard error, since results go to standard output; `os._exit` ends a trial; the current
     folder and the standard streams are put back.
     """
-    with put_back(), contextlib.redirect_stdout(sys.stderr), _no_silent_end():
+    with put_back(), _output_to_errors(), contextlib.redirect_stdout(sys.stderr), _no_silent_end():
         yield
+
+
+@contextlib.contextmanager
+def _output_to_errors() -> Generator[None]:
+    """Let what compiled code prints in the body, which knows descriptors alone, go to standard error, too."""
+    sys.stdout.flush()
+    _flush_c()
+    output = os.dup(_OUTPUT)
+    os.dup2(_ERRORS, _OUTPUT)
+    try:
+        yield
+    finally:
+        _flush_c()
+        os.dup2(output, _OUTPUT)
+        os.close(output)
+
+
+def _flush_c() -> None:
+    """Let the C library write out what it holds back."""
+    ctypes.CDLL(None).fflush(None)
 
 
 @contextlib.contextmanager

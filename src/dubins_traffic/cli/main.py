@@ -6,11 +6,10 @@ Nothing is loaded here before Ctrl-C is heard; `cli.commands` loads the rest.
 from __future__ import annotations
 
 import gc
-import signal
 import sys
 from collections.abc import Sequence
 
-from dubins_traffic.cli.signals import hear_no_more, heard_again, interrupt
+from dubins_traffic.cli.signals import hear_no_more, heard_again, listen
 from dubins_traffic.runs.left_threads import end_despite_threads
 
 FAILED = 1
@@ -26,12 +25,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Parameters
     ----------
     arguments : sequence of str, optional
-        What follows the program's name; without it, those of this process. SIGTERM is then heard as Ctrl-C is, and
-        when this returns neither is heard any more: all that is left to do is to end.
+        What follows the program's name; without it, those of this process. SIGTERM is then heard as Ctrl-C is, the
+        second of either ends the process, and when this returns neither is heard any more: all that is left to do is
+        to end.
     """
     if arguments is not None:
         return _run(arguments)
-    signal.signal(signal.SIGTERM, interrupt)
+    listen()
     status = FAILED
     gc.set_threshold(COLLECT_AFTER)
     try:
@@ -53,6 +53,10 @@ def _run(arguments: Sequence[str]) -> int:
             return _concluded(list(arguments))
     except KeyboardInterrupt:
         return _interrupted()
+    except Exception as error:
+        if _is_interrupt(error):
+            return _interrupted()
+        raise
 
 
 def _concluded(arguments: list[str]) -> int:
@@ -60,6 +64,7 @@ def _concluded(arguments: list[str]) -> int:
     from dubins_traffic.cli import faults
 
     faults.open_streams()
+    faults.forget_no_width()
     try:
         from dubins_traffic.cli.commands import app
 

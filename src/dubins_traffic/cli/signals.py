@@ -9,10 +9,12 @@ from collections.abc import Generator
 from contextlib import contextmanager
 from time import sleep
 from types import FrameType
-from typing import NoReturn
+from typing import Any, NoReturn
 
 SOON = 0.01
 """Seconds after which it comes again."""
+_heard: dict[int, Any] = {}
+"""Who heard the signals that have been heard once."""
 
 
 @contextmanager
@@ -26,6 +28,7 @@ def heard_again() -> Generator[None]:
 
     def hear(dropped: sys.UnraisableHookArgs) -> None:
         if issubclass(dropped.exc_type, KeyboardInterrupt):
+            _as_if_unheard()
             threading.Thread(target=_press, daemon=True).start()
         else:
             before(dropped)
@@ -38,15 +41,33 @@ def heard_again() -> Generator[None]:
 
 
 def interrupt(number: int, _frame: FrameType | None) -> NoReturn:
-    """Hear a signal as Ctrl-C is heard; when it comes again it does what it does to programs that don't listen."""
+    """Hear a signal as Ctrl-C is heard; when it comes again it ends the process, whatever that is doing.
+
+    So a controller that catches all that is raised can't keep a program from ending. What is finished is on the disk.
+    """
+    _heard[number] = signal.getsignal(number)
     signal.signal(number, signal.SIG_DFL)
     raise KeyboardInterrupt
+
+
+def listen() -> None:
+    """Hear Ctrl-C, unless whoever began this process ignores it, and SIGTERM."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, interrupt)
+    signal.signal(signal.SIGTERM, interrupt)
 
 
 def hear_no_more() -> None:
     """Ignore Ctrl-C and SIGTERM from now on."""
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
+
+
+def _as_if_unheard() -> None:
+    """Let the next signal be heard as the first."""
+    if threading.current_thread() is threading.main_thread():
+        while _heard:
+            signal.signal(*_heard.popitem())
 
 
 def _press() -> None:

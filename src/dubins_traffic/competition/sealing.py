@@ -303,16 +303,21 @@ def _folder(phase: Seeded) -> Path:
     return phase.folder
 
 
-def cipher_of(key: bytes, salt: bytes) -> Any:
-    """Return the cipher (AESGCM) whose key scrypt derives from a passphrase or key; MissingExtraError without it."""
+def cipher_class() -> Any:
+    """Return the class of the cipher; MissingExtraError without the extra `competition`."""
     try:
         from cryptography.hazmat.primitives.ciphers.aead import AESGCM
     except ImportError as error:
         raise MissingExtraError("sealed seeds", "competition") from error
+    return AESGCM
+
+
+def cipher_of(key: bytes, salt: bytes) -> Any:
+    """Return the cipher (AESGCM) whose key scrypt derives from a passphrase or key; MissingExtraError without it."""
     derived = hashlib.scrypt(
         checked_key(key), salt=salt, n=COST, r=_BLOCK, p=_LANES, maxmem=_MEMORY, dklen=32
     )
-    return AESGCM(derived)
+    return cipher_class()(derived)
 
 
 def _bound(head: Mapping[str, object]) -> bytes:

@@ -11,7 +11,7 @@ from typing import Any, Final
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.case import Case, read_case
-from dubins_traffic.files import locked, read_text, write_text
+from dubins_traffic.files import locked, make_folder, read_text, write_text
 from dubins_traffic.problem.files import parse_json
 
 CASES: Final = "cases"
@@ -102,10 +102,8 @@ def opened(folder: Path, settings: Any, *, resume: bool) -> Generator[Archive]:
     InputError
         If the folder holds something else, another search, is in use or can't be written.
     """
-    try:
-        (folder / CASES).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise InputError(f"can't hold a search ({error.strerror})", file=str(folder)) from None
+    make_folder(folder, "a search", begun=resume)
+    make_folder(folder / CASES, "a search")
     with locked(folder):
         archive = Archive(folder)
         state = archive.state()

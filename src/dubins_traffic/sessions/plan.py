@@ -6,6 +6,7 @@ Unlike the jobs of a run (`runs.plan`), the trials of a session are drawn one af
 from __future__ import annotations
 
 import os
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass, field, replace
@@ -39,6 +40,8 @@ from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import Maestro
 from dubins_traffic.transports.patience import Patience
 
+SOON = 1.0
+"""Seconds after which is told that something is compiled."""
 REHEARSAL = 1.2
 """Duration of the trial that `rehearse` runs, seconds: more than a block of frames."""
 
@@ -202,10 +205,18 @@ class SessionPlan:
 
     def rehearse(self) -> None:
         """Compile the kernels that trials need, before drivers wait for them."""
-        self.say("compiling what trials need; the first time on a machine takes minutes")
         began = monotonic()
-        rehearse(self.supply(0), shield=self.shield)
-        self.say(f"compiled, after {monotonic() - began:.1f} s")
+        late = threading.Timer(
+            SOON, self.say, ["compiling what trials need; the first time on a machine takes minutes"]
+        )
+        late.start()
+        try:
+            rehearse(self.supply(0), shield=self.shield)
+        finally:
+            late.cancel()
+            late.join()
+        if monotonic() - began > SOON:
+            self.say(f"compiled, after {monotonic() - began:.1f} s")
 
     def conclude(self, results: Sequence[Result]) -> ScoreSheet:
         """Return the scores, and write the trial data file if one was asked for."""

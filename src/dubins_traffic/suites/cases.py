@@ -89,7 +89,7 @@ def run_cases(
     instances = case_instances(entries)
     for spec in specs:
         controllers.load(spec)
-    make_folder(folder, "results")
+    make_folder(folder, "results", begun=resume)
     with locked(folder):
         file = folder / FILE
         found = _kept(file, suite) if file.exists() else {}

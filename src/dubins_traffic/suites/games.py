@@ -144,7 +144,7 @@ def run_games(
     games = suite.model.games
     if games is None:
         raise InputError("a suite of trials, which has no games", file=suite.file or suite.name)
-    make_folder(folder, "answers")
+    make_folder(folder, "answers", begun=resume)
     with locked(folder):
         file = folder / KEPT
         answers = _kept(file, suite, solver) if file.exists() else {}

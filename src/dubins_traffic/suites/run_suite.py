@@ -6,6 +6,9 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from dubins_traffic.campaign import rows
+from dubins_traffic.campaign.report.plots import figures
+from dubins_traffic.campaign.report.statistics import stats
 from dubins_traffic.campaign.run_campaign import Progress, run_campaign
 from dubins_traffic.suites.results import save_trials
 from dubins_traffic.suites.suite import Suite
@@ -45,9 +48,12 @@ def run_suite(
     ------
     InputError
         As `Suite.campaign` and `run_campaign`; what is finished is kept.
+    MissingExtraError
+        Without what a page of results needs; nothing is written then.
     KeyboardInterrupt
         On Ctrl-C; what is finished is kept.
     """
+    rows.arrow(), figures(), stats()
     campaign = suite.campaign(controllers or suite.controllers, trials)
     ran = run_campaign(campaign, folder, workers=workers, resume=resume, progress=progress)
     return save_trials(suite, campaign, ran.folder)

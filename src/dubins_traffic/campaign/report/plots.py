@@ -212,12 +212,22 @@ def _bars(
     return _svg(draw, (5.6, 0.95 + 0.38 * len(names)))
 
 
-def _svg(draw: Any, size: tuple[float, float]) -> str:
+def figures() -> tuple[Any, Any]:
+    """Return the module matplotlib, and that of its figures.
+
+    Raises
+    ------
+    MissingExtraError
+        Without the extra `campaign`.
+    """
     try:
-        matplotlib: Any = import_module("matplotlib")
-        made: Any = import_module("matplotlib.figure")
+        return import_module("matplotlib"), import_module("matplotlib.figure")
     except ImportError as error:
         raise MissingExtraError("a report", "campaign") from error
+
+
+def _svg(draw: Any, size: tuple[float, float]) -> str:
+    matplotlib, made = figures()
     with matplotlib.rc_context(dict(_STYLE)):
         figure = made.Figure(figsize=size, layout="constrained")
         draw(figure.add_subplot())

@@ -14,6 +14,8 @@ from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.csv_tables import csv_files
 from dubins_traffic.campaign.report.page import page
+from dubins_traffic.campaign.report.plots import figures
+from dubins_traffic.campaign.report.statistics import stats
 from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
@@ -68,6 +70,7 @@ def write_report(
     MissingExtraError
         Without the extra `campaign`.
     """
+    rows.arrow(), figures(), stats()
     place = Path(folder)
     known, campaign, parts = _open(place)
     results = table.read(place, campaign, parts)
