@@ -78,3 +78,6 @@ def estimate(
             )
     else:
         print(f"{found.trials} trials in {len(found.runs)} runs of multilevel splitting")
+    if found.replicas is not None:
+        for sentence in found.replicas.advice:
+            print(sentence)
