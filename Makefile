@@ -48,7 +48,8 @@ test-all: test ## all tests, then those of which the suite runs a part, in full:
 	DUBINS_TRAFFIC_PAGES=all $(BIN)/python -m pytest tests/integration/test_docs_code.py \
 		tests/integration/test_readme.py -k runs
 	DUBINS_TRAFFIC_ESTIMATES=full $(BIN)/python -m pytest tests/integration/test_falsify.py \
-		tests/integration/test_falsify_targets.py -k "splitting or million or guides"
+		tests/integration/test_falsify_targets.py tests/integration/test_splitting.py \
+		-k "splitting or million or guides"
 	$(BIN)/python -m benchmarks verify odd_egos rules towns
 
 golden: .venv/.installed-dev ## compare what trials, batches, campaigns and games give with tests/golden/hashes.json

@@ -35,7 +35,7 @@ def measure(runs: int = RUNS, trials: int = TRIALS, rare: int = RARE_RUNS) -> li
 def once(crossings: int, run: int, particles: int) -> Split:
     """Return what a run of the splitting gives."""
     instances = list(draw_many(corridor(crossings), run, range(particles)))
-    return split(instances, standing(), NEAR, instances[0].ticks, np.random.default_rng(run))
+    return split(instances, standing(), NEAR, [np.random.default_rng(run)])[0]
 
 
 def against_monte_carlo(runs: int, trials: int) -> Row:

@@ -14,11 +14,12 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.falsification import search
 from dubins_traffic.falsification.archive import files
 from dubins_traffic.falsification.case import Case, read_case
+from dubins_traffic.falsification.companies import Driven
 from dubins_traffic.falsification.estimate import by_counting, by_splitting, drawn
 from dubins_traffic.falsification.intervals import clopper_pearson
 from dubins_traffic.falsification.judging import confirm, judge
 from dubins_traffic.falsification.shrink import single_removals
-from dubins_traffic.falsification.splitting import follow, split
+from dubins_traffic.falsification.splitting import Particle, follow, split
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import NEAR, Rolling, corridor, standing
 
@@ -178,19 +179,23 @@ def test_a_particle_that_branches_off_is_a_fork_bit_for_bit() -> None:
     begin = standing()
     whole = begin(instances)
     whole.advance(90)
-    twin = whole.reseeded([7, 8, 9, 10])
-    twin.advance(instances[0].ticks - 90)
-    from dubins_traffic.falsification.splitting import Particle
-
+    twin = Driven(whole.group.fork(range(4), [7, 8, 9, 10]), whole.rule)
+    whole.reseed([7, 8, 9, 10])
+    for own in (whole, twin):
+        own.advance(instances[0].ticks - 90)
     particles = [
-        Particle(own, ((0, own.seed), (3, seed))) for own, seed in zip(instances, (7, 8, 9, 10), strict=True)
+        Particle(k, ((0, own.seed), (3, seed)))
+        for k, (own, seed) in enumerate(zip(instances, (7, 8, 9, 10), strict=True))
     ]
-    paths = follow(particles, begin, 30, instances[0].ticks)
-    assert paths[:, -1].tolist() == twin.margins().tolist()
+    seeds = [own.seed for own in instances]
+    paths = follow(particles, begin(instances), seeds, 30, instances[0].ticks)
+    assert paths.margins.tolist() == twin.margins().tolist() == whole.margins().tolist()
+    assert (np.diff(paths.scores, axis=1) <= 0.0).all()
+    assert (paths.scores[:, -1] <= paths.margins).all()
 
 
 def test_splitting_and_monte_carlo_agree_on_an_event_whose_probability_is_known() -> None:
-    crossings, particles, runs = (6, 200, 20) if FULL else (4, 60, 6)
+    crossings, particles, runs = (6, 200, 20) if FULL else (4, 60, 16)
     known = 3.0**-crossings
     configuration = corridor(crossings)
     found = by_splitting(
@@ -213,7 +218,7 @@ def test_an_event_of_one_in_a_million_is_estimated_with_fifty_thousand_trials() 
     runs, particles = (10, 2_500) if FULL else (1, 400)
     for run in range(runs):
         instances = list(draw_many(configuration, run, range(particles)))
-        once = split(instances, standing(), NEAR, instances[0].ticks, np.random.default_rng(run))
+        (once,) = split(instances, standing(), NEAR, [np.random.default_rng(run)])
         assert once.trials <= 50_000
         found.append(once.probability)
     if FULL:

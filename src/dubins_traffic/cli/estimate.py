@@ -92,3 +92,6 @@ def _show(found: Probability) -> None:
             )
     else:
         print(f"{found.trials} trials in {len(found.runs)} runs of multilevel splitting")
+    if found.replicas is not None:
+        for sentence in found.replicas.advice:
+            print(sentence)

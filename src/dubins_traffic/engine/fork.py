@@ -99,6 +99,12 @@ def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, d
     )
 
 
+def reseed(world: World, seeds: npt.NDArray[np.uint64]) -> None:
+    """Let each trial draw from another seed from here on, (B,), with the bits of its fork that has this seed."""
+    world.agents.team["seed"] = seeds
+    world.drivers.seed[:] = seeds
+
+
 def rows_of(table: Table, trials: Ints, **other: Any) -> Table:
     """Return a copy of a table with the rows `trials` of each array, except for the arrays given in `other`."""
     names = table.field_names

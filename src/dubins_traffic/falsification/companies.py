@@ -9,6 +9,7 @@ import numpy as np
 
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Controlled, Maker, grouped
+from dubins_traffic.engine.fork import reseed
 from dubins_traffic.engine.group import Group
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
 from dubins_traffic.errors import ControllerError, InputError
@@ -26,6 +27,10 @@ COLUMNS: Final = {"1.road": "road", "2.left": "line", "2.return": "back"}
 ENTRIES: Final = {"3.stop": "stop", "3.order": "order", "3.clear": "clear"}
 MEASURED: Final = ("1.collision", *COLUMNS, *ENTRIES)
 """The rules whose margins can be watched while a trial runs."""
+AHEAD: Final = (0.25, 0.5, 0.75, 1.0, 1.5, 2.0, 2.5, 3.0)
+"""Seconds by which a level looks ahead."""
+HASTE: Final = 0.05
+"""Metres by which a gap counts as wider for each second until then."""
 
 
 class Watched:
@@ -63,6 +68,31 @@ class Watched:
         margins: Any = found[COLUMNS[self.rule]]
         return margins.copy()
 
+    def levels(self) -> Floats:
+        """Return how near each trial is to a breach, or was, (B,): its margin, of `1.collision` the one to come too."""
+        margins = self.margins()
+        return margins if self.rule != "1.collision" else np.minimum(margins, coming(self.group))
+
+
+def coming(group: Group) -> Floats:
+    """Return the clearance to come of each trial's ego, (B,): infinite where it is alone.
+
+    It is the least, over the next `AHEAD` seconds at present speeds and headings, of the gap between the discs around
+    the ego and another car, and of `HASTE` metres for each second until then: what is far off counts as less near.
+    """
+    state, reach = group.state, group.world.cars.reach
+    x, y = (array[:, 1:] - array[:, :1] for array in (state.x, state.y))
+    vx, vy = (own[:, 1:] - own[:, :1] for own in (state.speed * state.c, state.speed * state.s))
+    places: int = state.x.shape[1]
+    absent = np.arange(1, places) >= state.count[:, None]
+    least = np.full(len(x), np.inf)
+    for later in AHEAD:
+        dx, dy = x + later * vx, y + later * vy
+        gap = np.sqrt(dx * dx + dy * dy) - 2.0 * reach[:, None]
+        gap[absent] = np.inf
+        least = np.minimum(least, np.maximum(gap, 0.0).min(axis=1, initial=np.inf) + HASTE * later)
+    return least
+
 
 class Driven(Watched):
     """Trials that are run by the group itself: its egos keep the rules, or are told nothing and stand."""
@@ -71,9 +101,13 @@ class Driven(Watched):
         """Take all trials some ticks farther."""
         self.group.advance(ticks)
 
-    def reseeded(self, seeds: Sequence[int]) -> Driven:
-        """Return forks of all trials that go on from these seeds."""
-        return Driven(self.group.fork(range(len(seeds)), seeds), self.rule)
+    def fork(self, trials: Sequence[int]) -> Driven:
+        """Return independent copies of some trials."""
+        return Driven(self.group.fork(trials), self.rule)
+
+    def reseed(self, seeds: Sequence[int]) -> None:
+        """Let each trial go on from another seed; what names them still has their first one."""
+        reseed(self.group.world, np.array(seeds, dtype=np.uint64))
 
 
 class Steered(Watched):
@@ -98,9 +132,14 @@ class Steered(Watched):
                     told = f"{outcome.instance.title} ended by a fault ({outcome.ending})"
                     raise ControllerError(outcome.ending.end.value, told)
 
-    def reseeded(self, seeds: Sequence[int]) -> Steered:
-        """Return forks of all trials that go on from these seeds."""
-        return Steered(self._seats.fork(range(len(seeds)), seeds), self.rule, self._name)
+    def fork(self, trials: Sequence[int]) -> Steered:
+        """Return independent copies of some trials, each with a copy of its controller."""
+        return Steered(self._seats.fork(trials), self.rule, self._name)
+
+    def reseed(self, seeds: Sequence[int]) -> None:
+        """Let each trial go on from another seed."""
+        self._seats = self._seats.fork(range(len(seeds)), seeds)
+        self.group = self._seats.group
 
 
 def beginner(make: Maker, name: str, rule: str) -> Begin:

@@ -16,10 +16,11 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.companies import beginner
 from dubins_traffic.falsification.counts import Counts
 from dubins_traffic.falsification.crew import Crew, crew_of, maker
-from dubins_traffic.falsification.intervals import Interval, clopper_pearson, of_mean, wilson
+from dubins_traffic.falsification.intervals import Interval, clopper_pearson, wilson
 from dubins_traffic.falsification.liveness import TARGETS
+from dubins_traffic.falsification.replicas import Replicas, combined
 from dubins_traffic.falsification.sampling import STREAM, prepared
-from dubins_traffic.falsification.splitting import Begin, split
+from dubins_traffic.falsification.splitting import Begin, Split, split
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many
 
@@ -31,6 +32,8 @@ RUNS: Final = 10
 """Independent runs of the splitting, from whose spread the interval follows."""
 PARTICLES: Final = 200
 BATCH: Final = 256
+TOGETHER: Final = 2_000
+"""About how many particles of several runs of the splitting are on their way at a time."""
 
 Progress = Callable[[int], object]
 
@@ -48,8 +51,7 @@ class Probability:
     probability : float
         The estimate.
     interval : (float, float)
-        Its 95 % interval: Clopper and Pearson's, or that of the mean of independent runs; where no run got there, that
-        of the first trials of all runs.
+        Its 95 % interval: Clopper and Pearson's, or that of independent runs (`replicas.Replicas`).
     wilson : (float, float) or None
         Wilson's interval, of Monte Carlo.
     trials, events, discarded : int
@@ -62,6 +64,8 @@ class Probability:
         of the others. If these are none, the probability is not a number.
     fault : str
         How many trials ended by which fault, and why the first; empty if none did.
+    replicas : Replicas or None
+        What these runs say together, and whether Monte Carlo is better.
     """
 
     method: str
@@ -75,6 +79,7 @@ class Probability:
     runs: tuple[float, ...] = ()
     left_out: int = 0
     fault: str = ""
+    replicas: Replicas | None = None
 
     def to_json(self) -> dict[str, Any]:
         """Return the estimate as a JSON object."""
@@ -90,7 +95,7 @@ class Probability:
             "runs": list(self.runs),
             "left_out": self.left_out,
             "fault": self.fault,
-        }
+        } | ({} if self.replicas is None else self.replicas.to_json())
 
 
 def estimate(
@@ -207,20 +212,19 @@ def by_splitting(
     for name, value, least in (("particles", particles, 10), ("runs", runs, 2)):
         if value < least:
             raise InputError("too few", field=name, value=value, expected=f"at least {least}")
-    found: list[float] = []
-    trials = 0
-    for run in range(runs):
-        instances = draw(range(run * particles, (run + 1) * particles))
-        dice = np.random.default_rng([STREAM, seed, run, 1])
-        once = split(instances, begin, below, instances[0].ticks, dice)
-        found.append(once.probability)
-        trials += once.trials
-        progress(trials)
-    mean = float(np.mean(found))
-    interval = of_mean(found) if mean > 0.0 else clopper_pearson(0, runs * particles)
+    splits: list[Split] = []
+    for first in range(0, runs, most := max(1, TOGETHER // particles)):
+        some = range(first, min(first + most, runs))
+        dice = [np.random.default_rng([STREAM, seed, run, 1]) for run in some]
+        instances = draw(range(some.start * particles, some.stop * particles))
+        before = sum(own.trials for own in splits)
+        splits += split(instances, begin, below, dice, lambda done, before=before: progress(before + done))
+    found = combined(splits, particles)
+    each = tuple(own.probability for own in splits)
     return Probability(
-        "splitting", words(event, below), mean, interval, None, trials, None, None, tuple(found)
-    )
+        "splitting", words(event, below), found.probability, found.interval, None, found.trials, None, None, each,
+        replicas=found,
+    )  # fmt: skip
 
 
 def drawn(configuration: Configuration, seed: int) -> Callable[[range], list[Instance]]:

@@ -1,7 +1,8 @@
 """Confidence intervals of a probability: Wilson's, Clopper and Pearson's, and of the mean of a few estimates.
 
 Sources: E. Wilson, Journal of the American Statistical Association 22, 1927; C. Clopper and E. Pearson, Biometrika 26,
-1934; the incomplete beta function by its continued fraction (W. Lentz, Applied Optics 15, 1976).
+1934; E. Korn and B. Graubard, Survey Methodology 24, 1998; the incomplete beta function by its continued fraction (W.
+Lentz, Applied Optics 15, 1976).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ Interval = tuple[float, float]
 NORMAL: Final = 1.959963984540054
 """The normal distribution has 95 % of its weight within so many standard deviations."""
 TAIL: Final = 0.025
+MOST_WORTH: Final = 1e9
 HALVINGS: Final = 200
 
 
@@ -27,7 +29,7 @@ def wilson(count: int, total: int) -> Interval:
     return (0.0 if count == 0 else middle - half, 1.0 if count == total else middle + half)
 
 
-def clopper_pearson(count: int, total: int) -> Interval:
+def clopper_pearson(count: float, total: float) -> Interval:
     """Return the exact 95 % interval, which holds the probability in at least 95 of 100 cases."""
     low = 0.0 if count == 0 else _solve(lambda p: incomplete_beta(count, total - count + 1, p), TAIL)
     high = (
@@ -36,13 +38,28 @@ def clopper_pearson(count: int, total: int) -> Interval:
     return low, high
 
 
-def of_mean(values: Sequence[float]) -> Interval:
-    """Return Student's 95 % interval of the mean of independent values, at least two of them; none is below 0."""
+def korn_graubard(values: Sequence[float]) -> Interval:
+    """Return the 95 % interval of a probability from independent estimates of it without bias, at least two.
+
+    It is Clopper and Pearson's for as many trials of Monte Carlo as would vary as much as the mean (`worth`), fewer
+    where the spread itself is known from few estimates: so it is as skew as a count of few, unlike Student's.
+    """
+    mean = math.fsum(values) / len(values)
+    if mean <= 0.0 or mean >= 1.0:
+        return (0.0, 1.0)
+    total = worth(values) * (NORMAL / student(len(values) - 1)) ** 2
+    return clopper_pearson(mean * total, total)
+
+
+def worth(values: Sequence[float]) -> float:
+    """Return how many trials of Monte Carlo would vary as much as the mean of independent estimates of a probability.
+
+    The mean must be above 0; at least two estimates. They are `MOST_WORTH` at most.
+    """
     count = len(values)
     mean = math.fsum(values) / count
-    spread = math.sqrt(math.fsum((value - mean) ** 2 for value in values) / (count - 1))
-    half = student(count - 1) * spread / math.sqrt(count)
-    return max(0.0, mean - half), mean + half
+    variance = math.fsum((value - mean) ** 2 for value in values) / (count - 1) / count
+    return min(MOST_WORTH, mean * (1.0 - mean) / variance) if variance > 0.0 else MOST_WORTH
 
 
 def student(freedom: int) -> float:

@@ -1,10 +1,28 @@
 """Adaptive multilevel splitting: the probability of a rare event from trials that go on where others came near it.
 
-Particles are trials. The level of a particle is the least margin that it has had; at every step those of the largest
-margins are given up, and each is replaced by a survivor that goes on from where it passed their level with another
-seed.
-The product of the shares that survived estimates the probability, without bias (C.-E. Bréhier, M. Gazeau, L.
-Goudenège, T. Lelièvre, M. Rousset, Annals of Applied Probability 26, 2016, for processes in discrete time).
+Particles are trials. The score of a particle is the least level that it has had, and levels look ahead: they are low
+where the event is about to happen. At every step the particles of the highest scores are given up, and each is replaced
+by a survivor that goes on from where it passed their score with another seed. The share of the particles in which the
+event happened in the end, times the product of the shares that survived, estimates its probability.
+
+With N particles, K_q of them given up at step q of Q, and Y the share of the last ones in which the event happened,
+
+    (1)  p = (1 - K_1 / N) ... (1 - K_Q / N) Y
+
+estimates the probability. Levels that are quantiles of the scores, and (1) for K_q the same at every step, are those of
+F. Cérou, A. Guyader, *Adaptive multilevel splitting for rare event analysis*, Stochastic Analysis and Applications 25,
+2007. That (1) has no bias, for any N, any level function and scores with ties, is the theorem of C.-E. Bréhier, M.
+Gazeau, L. Goudenège, T. Lelièvre, M. Rousset, *Unbiasedness of some generalized adaptive multilevel splitting
+algorithms*, Annals of Applied Probability 26, 2016, for trials in discrete time, on two conditions: with Z_q the level
+of step q and S(k) the score up to checkpoint k,
+
+    (2)  all particles of score S >= Z_q are given up, and none else;
+    (3)  a survivor is branched off at the first checkpoint k with S(k) < Z_q.
+
+It holds for the mean of any function of the path (their expectation (2)), here "the least margin is at most `below`".
+So the levels decide on the variance only, and need not say when the event has happened. As in the splitting of fixed
+effort (M. J. J. Garvels, *The splitting method in rare event simulation*, thesis, Twente, 2000) the number of particles
+stays the same.
 
 A particle that is replaced is run again from its beginning with the seeds of its ancestors, up to where it branches
 off: the same bits as those of a fork there, at any number of checkpoints and without keeping them.
@@ -14,17 +32,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Final, Protocol
+from typing import TYPE_CHECKING, Final, NamedTuple, Protocol
 
 import numpy as np
 
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Floats
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 CHECKPOINTS: Final = 40
-"""At so many times of a trial, about, a survivor can be branched off."""
+"""At so many times of a trial, about, its level is looked at, and a survivor can be branched off."""
 GIVEN_UP: Final = 0.2
 """Share of the particles that is replaced at each step, at least."""
 MOST_STEPS: Final = 1_000
@@ -41,8 +59,16 @@ class Company(Protocol):
         """Return the least margin that each trial has had, (B,)."""
         ...
 
-    def reseeded(self, seeds: Sequence[int]) -> Company:
-        """Return forks of all trials that go on from these seeds."""
+    def levels(self) -> Floats:
+        """Return how near each trial is to the event at its present frame, or was before, (B,): at most its margin."""
+        ...
+
+    def fork(self, trials: Sequence[int]) -> Company:
+        """Return independent copies of some trials at their present frames."""
+        ...
+
+    def reseed(self, seeds: Sequence[int]) -> None:
+        """Let each trial go on from another seed."""
         ...
 
 
@@ -51,107 +77,187 @@ Begin = Callable[[Sequence["Instance"]], Company]
 
 @dataclass(frozen=True, slots=True)
 class Particle:
-    """A trial: the instance, and from which checkpoint on it follows from which seed, in order, the first from 0."""
+    """A trial: which of the first particles it begins as, and from which checkpoint on it follows from which seed."""
 
-    instance: Instance
+    first: int
     seeds: tuple[tuple[int, int], ...]
 
     def branched(self, checkpoint: int, seed: int) -> Particle:
         """Return the particle that goes on from another seed at a checkpoint."""
         before = [own for own in self.seeds if own[0] < checkpoint]
-        return Particle(self.instance, (*before, (checkpoint, seed)))
+        return Particle(self.first, (*before, (checkpoint, seed)))
 
     def seed_at(self, checkpoint: int) -> int:
         """Return the seed from which it follows after a checkpoint."""
         return [seed for first, seed in self.seeds if first <= checkpoint][-1]
 
 
+class Paths(NamedTuple):
+    """What came of particles: the least level up to each checkpoint, (B, checkpoints); the least margin, (B,)."""
+
+    scores: Floats
+    margins: Floats
+
+
 @dataclass(frozen=True, slots=True)
 class Split:
-    """What one run of the algorithm gives: the estimate, how many trials it took, the margins passed."""
+    """What one run of the algorithm gives.
+
+    Attributes
+    ----------
+    probability : float
+        The estimate.
+    trials : int
+        How many trials it took.
+    counted : int
+        In how many of the first particles, which are independent trials, the event happened.
+    branches, repeated : int
+        How many particles were branched off; how many of them came to the margin of their parents, to the bit: nothing
+        was left to chance where they branched off.
+    levels : tuple of float
+        The scores at which particles were given up.
+    """
 
     probability: float
     trials: int
+    counted: int
+    branches: int
+    repeated: int
     levels: tuple[float, ...]
 
 
+class Run:
+    """One run of the algorithm on its way.
+
+    Parameters
+    ----------
+    particles : list of Particle
+        The first ones.
+    paths : Paths
+        What came of them.
+    below : float
+        The margin that is rare.
+    dice : Generator
+        Draws survivors and seeds.
+    """
+
+    def __init__(
+        self, particles: list[Particle], paths: Paths, below: float, dice: np.random.Generator
+    ) -> None:
+        self._particles, self._paths, self._below, self._dice = particles, paths, below, dice
+        self._counted = int((paths.margins <= below).sum())
+        self._most = max(1, round(GIVEN_UP * len(particles)))
+        self._survived = 1.0
+        self._branches = self._repeated = 0
+        self._levels: list[float] = []
+        self._lost = self._parents = np.empty(0, dtype=np.int64)
+        self._children: list[Particle] = []
+
+    def children(self) -> list[Particle]:
+        """Give up the particles of the highest scores; return those that replace them, none when the run is over."""
+        reached = self._paths.scores[:, -1]
+        level = float(np.sort(reached)[-self._most])
+        if self._survived == 0.0 or level <= self._below or len(self._levels) == MOST_STEPS:
+            return []
+        self._lost, kept = np.flatnonzero(reached >= level), np.flatnonzero(reached < level)
+        self._levels.append(level)
+        self._survived *= len(kept) / len(reached)
+        if not len(kept):
+            return []
+        self._parents = kept[self._dice.integers(len(kept), size=len(self._lost))]
+        parents: list[int] = self._parents.tolist()
+        passed: list[int] = np.argmax(self._paths.scores[self._parents] < level, axis=1).tolist()
+        seeds: list[int] = self._dice.integers(0, 1 << 63, size=len(self._lost)).tolist()
+        drawn = zip(parents, passed, seeds, strict=True)
+        self._children = [self._particles[parent].branched(point, seed) for parent, point, seed in drawn]
+        return self._children
+
+    def replace(self, found: Paths) -> None:
+        """Put the children in the places of what was given up; `found` is what came of them."""
+        self._branches += len(self._lost)
+        self._repeated += int((found.margins == self._paths.margins[self._parents]).sum())
+        self._paths.scores[self._lost], self._paths.margins[self._lost] = found
+        for place, child in zip(self._lost.tolist(), self._children, strict=True):
+            self._particles[place] = child
+
+    def result(self) -> Split:
+        """Return what the run gives."""
+        happened = float(np.mean(self._paths.margins <= self._below))
+        trials = len(self._particles) + self._branches
+        return Split(
+            self._survived * happened, trials, self._counted, self._branches, self._repeated,
+            tuple(self._levels),
+        )  # fmt: skip
+
+
 def split(
-    instances: Sequence[Instance], begin: Begin, below: float, ticks: int, dice: np.random.Generator
-) -> Split:
-    """Return an estimate of the probability that a trial's least margin gets to `below` or less.
+    instances: Sequence[Instance],
+    begin: Begin,
+    below: float,
+    dice: Sequence[np.random.Generator],
+    progress: Callable[[int], object] = int,
+) -> list[Split]:
+    """Return independent estimates of the probability that a trial's least margin gets to `below` or less.
+
+    The runs take their steps together, so that fewer and larger groups of trials are stepped.
 
     Parameters
     ----------
     instances : sequence of Instance
-        The first particles, independent draws of what a trial may be.
+        The first particles of all runs, one run's after another's: independent draws of what a trial may be, of one
+        duration.
     begin : callable
         Begins trials of instances.
     below : float
         The margin that is rare.
-    ticks : int
-        Ticks of a trial.
-    dice : Generator
-        Draws survivors and seeds.
+    dice : sequence of Generator
+        For each run what draws its survivors and seeds.
+    progress : callable
+        Is told how many trials have run.
     """
-    every = max(1, ticks // CHECKPOINTS)
-    particles = [Particle(own, ((0, own.seed),)) for own in instances]
-    paths = follow(particles, begin, every, ticks)
-    count, most = len(particles), max(1, round(GIVEN_UP * len(particles)))
-    probability, trials = 1.0, count
-    levels: list[float] = []
-    for _ in range(MOST_STEPS):
-        reached = paths[:, -1]
-        level = float(np.sort(reached)[-most])
-        if level <= below:
-            break
-        lost = np.flatnonzero(reached >= level)
-        kept = np.flatnonzero(reached < level)
-        levels.append(level)
-        probability *= len(kept) / count
-        if not len(kept):
-            break
-        _replace(particles, paths, lost, kept, level, (begin, every, ticks), dice)
-        trials += len(lost)
-    return Split(probability * float(np.mean(paths[:, -1] <= below)), trials, tuple(levels))
+    company, ticks, seeds = begin(instances), instances[0].ticks, [own.seed for own in instances]
+    every, each = max(1, ticks // CHECKPOINTS), len(instances) // len(dice)
+    first = [Particle(k, ((0, seed),)) for k, seed in enumerate(seeds)]
+    paths = follow(first, company, seeds, every, ticks)
+    runs: list[Run] = []
+    for k, own in enumerate(dice):
+        mine = slice(k * each, (k + 1) * each)
+        runs.append(Run(first[mine], Paths(paths.scores[mine], paths.margins[mine]), below, own))
+    done = len(first)
+    going = [(run, found) for run in runs if (found := run.children())]
+    while going:
+        progress(done)
+        children = [child for _, some in going for child in some]
+        paths = follow(children, company, seeds, every, ticks)
+        end = 0
+        for run, some in going:
+            begun, end = end, end + len(some)
+            run.replace(Paths(paths.scores[begun:end], paths.margins[begun:end]))
+        done += len(children)
+        going = [(run, found) for run, _ in going if (found := run.children())]
+    progress(done)
+    return [run.result() for run in runs]
 
 
-def _replace(
-    particles: list[Particle],
-    paths: Floats,
-    lost: Ints,
-    kept: Ints,
-    level: float,
-    how: tuple[Begin, int, int],
-    dice: np.random.Generator,
-) -> None:
-    """Let survivors that are drawn go on in the place of what is lost."""
-    parents: list[int] = kept[dice.integers(len(kept), size=len(lost))].tolist()
-    seeds: list[int] = dice.integers(0, 1 << 63, size=len(lost)).tolist()
-    children: list[Particle] = []
-    for parent, seed in zip(parents, seeds, strict=True):
-        checkpoint = int(np.flatnonzero(paths[parent] < level)[0])
-        children.append(particles[parent].branched(checkpoint, seed))
-    paths[lost] = follow(children, *how)
-    for place, child in zip(lost.tolist(), children, strict=True):
-        particles[place] = child
-
-
-def follow(particles: Sequence[Particle], begin: Begin, every: int, ticks: int) -> Floats:
-    """Run particles; return the least margin that each has had at every checkpoint, (B, checkpoints).
+def follow(
+    particles: Sequence[Particle], company: Company, seeds: Sequence[int], every: int, ticks: int
+) -> Paths:
+    """Run particles from their first frames, in which the first particles (`company`, of `seeds`) stay.
 
     Checkpoint 0 is the first frame, and there is one every `every` ticks, the last at the end.
     """
-    company = begin([own.instance for own in particles])
-    found = [company.margins()]
-    present = [own.instance.seed for own in particles]
+    running = company.fork([own.first for own in particles])
+    found = [running.levels()]
+    present = [seeds[own.first] for own in particles]
     done = checkpoint = 0
     while done < ticks:
         wanted = [own.seed_at(checkpoint) for own in particles]
         if wanted != present:
-            company, present = company.reseeded(wanted), wanted
+            running.reseed(wanted)
+            present = wanted
         step = min(every, ticks - done)
-        company.advance(step)
+        running.advance(step)
         done += step
         checkpoint += 1
-        found.append(company.margins())
-    return np.stack(found, axis=1)
+        found.append(running.levels())
+    return Paths(np.minimum.accumulate(np.stack(found, axis=1), axis=1), running.margins())
