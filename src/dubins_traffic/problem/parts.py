@@ -290,13 +290,13 @@ Rules = Annotated[RulesModel | None, BeforeValidator(_switch), Field(json_schema
 LaserSwitch = Annotated[LaserModel | None, BeforeValidator(_switch), Field(json_schema_extra=_with_switch)]
 
 
+ROADS = "a road network description (an object), or the path of one or of a map of another program"
+
+
 def _check_rnd(value: Any) -> Any:
     if isinstance(value, str | dict) and value:
         return value  # pyright: ignore[reportUnknownVariableType]
-    raise fault(
-        "not a road network",
-        "a road network description (an object), or the path of one or of a map of another program",
-    )
+    raise fault("not a road network", ROADS)
 
 
 RoadReference = Annotated[Any, AfterValidator(_check_rnd), WithJsonSchema({"type": ["string", "object"]})]

@@ -16,6 +16,7 @@ from dubins_traffic.problem.formulas import Formulas
 from dubins_traffic.problem.instance import Laser
 from dubins_traffic.problem.kinds import KINDS, NAMES_2016, NetworkPoint
 from dubins_traffic.problem.parts import (
+    ROADS,
     CarModel,
     DisturbancesModel,
     LaserSwitch,
@@ -29,7 +30,6 @@ from dubins_traffic.roads.from_grid import most_segments
 from dubins_traffic.roads.generate import MOST_INTERSECTIONS
 from dubins_traffic.rules.parameters import RuleParameters
 
-ROADS = "a road network description, or the path of one or of a map of another program"
 NAME = r"^[A-Za-z][A-Za-z0-9_/]*$"
 
 
@@ -150,9 +150,7 @@ class NetworkModel(Strict):
 
     random: RandomNetwork | None = Field(default=None, description="a random planar network")
     grid: GridNetwork | None = Field(default=None, description="a grid with segments removed")
-    file: Annotated[str, Field(min_length=1)] | None = Field(
-        default=None, description="the path of a road network description or of a map of another program"
-    )
+    file: Annotated[str, Field(min_length=1)] | None = Field(default=None, description="a path, as in rnd")
 
     @model_validator(mode="before")
     @classmethod

@@ -9,7 +9,6 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.roads.formats.rnd import LARGEST_POINT
 from dubins_traffic.roads.maps.choosing import Chooser
 from dubins_traffic.roads.maps.drafting import Draft, Drafter
 from dubins_traffic.roads.maps.fitting import line_of
@@ -23,6 +22,8 @@ MOST_WORK = 300
 """Most drafts of the whole map, or so many times as many of a small part of it."""
 LONGEST_ROAD, LONGEST_MAP = 1e5, 1e6
 """Most metres of a road, and of all roads of a map."""
+FARTHEST = 1e6
+"""Most metres of a coordinate of a network."""
 WIDTH_PLAY = 0.01
 """A lane is of another width if it differs by more than this share."""
 
@@ -110,10 +111,8 @@ def _check_place(road_map: RoadMap, scale: float, file: str | None) -> None:
     """Raise InputError if a map lies farther from its origin than a network may at a scale."""
     for road in road_map.roads:
         away = float(np.abs(road.line).max())
-        if scale * away > LARGEST_POINT:
-            expected = (
-                f"coordinates up to {LARGEST_POINT / scale:g} m at this scale: move the map to its origin"
-            )
+        if scale * away > FARTHEST:
+            expected = f"coordinates up to {FARTHEST / scale:g} m at this scale: move the map to its origin"
             raise InputError(
                 "too far from the origin",
                 file=file,
