@@ -80,7 +80,8 @@ class ActionMap:
         InputError
             If they are no actions.
         """
-        count: int = len(actions) if isinstance(actions, list | tuple) or getattr(actions, "ndim", 0) else 1
+        many: Any = actions  # np.iterable would narrow it to what has no length
+        count: int = len(many) if np.iterable(actions) else 1
         shares = np.zeros((count, 2))
         self.put(actions, shares)
         if not np.isfinite(shares).all():
