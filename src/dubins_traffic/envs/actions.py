@@ -80,7 +80,9 @@ class ActionMap:
         InputError
             If they are no actions.
         """
-        shares = np.zeros((len(actions) if np.iterable(actions) else 1, 2))
+        many: Any = actions  # np.iterable would narrow it to what has no length
+        count: int = len(many) if np.iterable(actions) else 1
+        shares = np.zeros((count, 2))
         self.put(actions, shares)
         if not np.isfinite(shares).all():
             raise _no_action(actions, "finite numbers")
