@@ -28,7 +28,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
     verdicts = [ruling.value for ruling in Ruling] if judged else []
     head = ["controller", "trials", f"{metric.heading}, mean", "sum"]
     head += ["clean", *verdicts] if judged else []
-    head += ["collisions", "fault of the ego", "came to nothing", *(f"{own.heading}, ms" for own in timed)]
+    head += ["collisions", "fault of the ego", "came to nothing", *(f"{own.label}, ms" for own in timed)]
     ranked = sorted(comparison.standings, key=lambda own: -(own.estimates[metric.name].mean or 0.0))
     body = [
         [
