@@ -40,7 +40,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
         "fault of the ego",
         "ended by the controller",
         "came to nothing",
-        *(f"{own.heading}, ms" for own in timed),
+        *(f"{own.label}, ms" for own in timed),
     ]
     ranked = sorted(
         comparison.standings,

@@ -53,7 +53,9 @@ def run_suite(
     KeyboardInterrupt
         On Ctrl-C; what is finished is kept.
     """
-    rows.arrow(), figures(), stats()
+    rows.arrow()
+    figures()
+    stats()
     campaign = suite.campaign(controllers or suite.controllers, trials)
     ran = run_campaign(campaign, folder, workers=workers, resume=resume, progress=progress)
     return save_trials(suite, campaign, ran.folder)
