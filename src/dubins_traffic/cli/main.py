@@ -13,6 +13,7 @@ from dubins_traffic.cli.signals import hear_no_more, heard_again, listen
 from dubins_traffic.runs.left_threads import end_despite_threads
 
 FAILED = 1
+WRONG_SYSTEM = 2
 COLLECT_AFTER = 50_000
 """New objects between two garbage collections: a program that begins makes very many, and nearly all of them stay."""
 INTERRUPTED = 130
@@ -56,7 +57,12 @@ def _run(arguments: Sequence[str]) -> int:
     except Exception as error:
         if _is_interrupt(error):
             return _interrupted()
-        raise
+        from dubins_traffic.errors import DubinsTrafficError
+
+        if not isinstance(error, DubinsTrafficError):
+            raise
+        print(f"dubins-traffic: {error}", file=sys.stderr)  # this system lacks what all commands need
+        return WRONG_SYSTEM
 
 
 def _concluded(arguments: list[str]) -> int:
