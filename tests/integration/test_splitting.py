@@ -15,7 +15,7 @@ from dubins_traffic.falsification.crew import maker
 from dubins_traffic.falsification.sampling import prepared
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import corridor
-from tests.splitting_events import Traffic, estimates, probability, traffic
+from tests.splitting_events import Traffic, estimates, probability, traffic, truths
 
 FULL = os.environ.get("DUBINS_TRAFFIC_ESTIMATES") == "full"
 """Whether there are as many estimates as the bar asks for: minutes."""
@@ -40,6 +40,11 @@ def test_the_intervals_of_splitting_hold_what_is_known_or_counted(
             low, high = found.interval
             held += low <= truth <= high
     assert held >= bar
+
+
+def test_one_probability_is_known_and_two_are_counted_in_a_million_trials() -> None:
+    assert len(EVENTS) == 3
+    assert all(found["trials"] >= 1_000_000 for found in truths().values())
 
 
 def test_runs_that_take_their_steps_together_are_those_that_take_them_alone() -> None:
