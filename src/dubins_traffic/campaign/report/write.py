@@ -70,7 +70,9 @@ def write_report(
     MissingExtraError
         Without the extra `campaign`.
     """
-    rows.arrow(), figures(), stats()
+    rows.arrow()
+    figures()
+    stats()
     place = Path(folder)
     known, campaign, parts = _open(place)
     results = table.read(place, campaign, parts)
