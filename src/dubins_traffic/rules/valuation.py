@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -29,9 +29,6 @@ from dubins_traffic.rules.vocabulary import (
 )
 
 Mask = npt.NDArray[np.bool_]
-
-_E1: Final = ("1.road", "2.", "3.")
-"""How the names of the rules begin that make up E1."""
 
 
 class _Scene(NamedTuple):
@@ -224,4 +221,4 @@ class _Visits:
 
 
 def _of_e1(breach: Breach) -> bool:
-    return breach.car != EGO and breach.rule.startswith(_E1)
+    return breach.car != EGO and not breach.rule.startswith("E")

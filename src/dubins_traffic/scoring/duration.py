@@ -36,6 +36,14 @@ def counted_rounds(rounds: int, *, clean: bool, whole: bool) -> int:
     return rounds if clean and whole else 0
 
 
+def early_rounds(rounds: float, ending: Ending | None) -> float:
+    """Return the rounds before the first breach that rank: 0 if the controller ended it.
+
+    Norm: docs/rules.md#before-breach.
+    """
+    return 0.0 if ending is not None and ending.by_controller else rounds
+
+
 COLUMNS = (
     ScoreColumn(Column("duration_s", "duration", "s"), lambda score: score.duration_s),
     ScoreColumn(

@@ -19,7 +19,7 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, Pending, accused, order
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven
-from dubins_traffic.scoring.duration import counted_rounds, planned_ticks, ran_whole
+from dubins_traffic.scoring.duration import counted_rounds, early_rounds, planned_ticks, ran_whole
 from dubins_traffic.scoring.goals import GoalVisits, Visits, rounds_with_share
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE, weight_of
 from dubins_traffic.scoring.margins import entries_by_rule, margins_by_rule
@@ -105,7 +105,8 @@ class BatchScores:
                 by_controller=ending.by_controller,
             )
         clean = is_clean(verdict, collisions, ending)
-        off_road = own.off_road / rate
+        early = rounds_with_share(own.early_rounds, own.early_goals, len(goals))
+        driven = _driven(own, rate, ticks)
         return Score(
             trial=instance.trial,
             seed=instance.seed,
@@ -115,27 +116,24 @@ class BatchScores:
             duration_s=ticks / rate,
             rounds=visits.rounds,
             counted_rounds=counted_rounds(visits.rounds, clean=clean, whole=whole),
-            rounds_before_breach=0.0
-            if ending.by_controller
-            else rounds_with_share(own.early_rounds, own.early_goals, len(goals)),
+            rounds_before_breach=early_rounds(early, ending),
             goals_visited=visits.visited,
             goals=visits.goals,
             collisions=collisions,
             collisions_among_others=among_others,
-            driven=Driven(
-                own.distance,
-                own.standing / max(1, ticks),
-                off_road,
-                own.off_road / max(1, ticks),
-                own.departures,
-            ),
+            driven=driven,
             min_clearance_m=gap,
             time_to_begin_s=time_to_begin,
             verdict=verdict,
             formulas=(),
-            paper_score=paper_score(instance, collisions, visits.rounds, off_road),
+            paper_score=paper_score(instance, collisions, visits.rounds, driven.off_road_s),
             icra2016=_icra2016(instance, own, ticks + 1),
         )
+
+
+def _driven(own: TrialCounts, rate: float, ticks: int) -> Driven:
+    off_road, most = own.off_road, max(1, ticks)
+    return Driven(own.distance, own.standing / most, off_road / rate, off_road / most, own.departures)
 
 
 def _visits(instance: Instance, rows: Sequence[GoalCounts], rounds: int) -> Visits:

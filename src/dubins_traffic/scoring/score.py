@@ -21,7 +21,7 @@ from dubins_traffic.scoring.blocks import joined
 from dubins_traffic.scoring.clearance import Clearance
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven, Driving
-from dubins_traffic.scoring.duration import counted_rounds, ran_whole
+from dubins_traffic.scoring.duration import counted_rounds, early_rounds, ran_whole
 from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
 from dubins_traffic.scoring.goals import GoalVisits, Visiting
 from dubins_traffic.scoring.icra2016 import Icra2016
@@ -30,7 +30,7 @@ from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.metric import Measured, MetricSpec
 from dubins_traffic.scoring.own_metrics import OwnMetrics
 from dubins_traffic.scoring.paper import paper_score
-from dubins_traffic.scoring.verdict import Ruling, Verdict
+from dubins_traffic.scoring.verdict import Ruling, Verdict, first_breach
 
 _BLOCK = 512
 
@@ -227,6 +227,7 @@ class Scorer:
         collisions, driven = self._collisions.result(), self._driving.result()
         whole = ran_whole(self._instance, self._ending, self._count - 1)
         clean = is_clean(verdict, collisions, self._ending)
+        broken = first_breach(verdict, collisions)
         return Score(
             trial=self._instance.trial,
             seed=self._instance.seed,
@@ -236,9 +237,7 @@ class Scorer:
             duration_s=max(0, self._count - 1) / self._instance.problem.rate,
             rounds=visits.rounds,
             counted_rounds=counted_rounds(visits.rounds, clean=clean, whole=whole),
-            rounds_before_breach=0.0
-            if self._ending is not None and self._ending.by_controller
-            else self._visiting.rounds_until(_first_breach(verdict, collisions)),
+            rounds_before_breach=early_rounds(self._visiting.rounds_until(broken), self._ending),
             goals_visited=visits.visited,
             goals=visits.goals,
             collisions=collisions,
@@ -327,13 +326,6 @@ def outcome(verdict: str | None, end: str | None) -> str:
     if verdict is None or (verdict == Ruling.UNFINISHED and end in BY_CONTROLLER):
         return str(end or "cut off")
     return str(verdict)
-
-
-def _first_breach(verdict: Verdict | None, collisions: Sequence[Collision]) -> int | None:
-    """Return the frame of the ego's first breach, without a verdict of its first collision; None if there is none."""
-    if verdict is None:
-        return collisions[0].tick if collisions else None
-    return min((found.tick for found in verdict.own_violations), default=None)
 
 
 def is_clean(verdict: Verdict | None, collisions: Sequence[Collision], ending: Ending | None) -> bool:

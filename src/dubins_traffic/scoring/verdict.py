@@ -315,6 +315,13 @@ def assumed(rules: RuleParameters) -> tuple[str, ...]:
     return tuple([name for name, switch in _SWITCHES if getattr(rules, switch)])
 
 
+def first_breach(verdict: Verdict | None, collisions: Sequence[Collision]) -> int | None:
+    """Return the frame of the ego's first breach, without a verdict of its first collision; None if there is none."""
+    if verdict is None:
+        return collisions[0].tick if collisions else None
+    return min((found.tick for found in verdict.own_violations), default=None)
+
+
 def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -> tuple[str, Breach] | None:
     """Return the part of the assumption that is broken first, with its breach; None if the assumption holds.
 
