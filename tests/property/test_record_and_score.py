@@ -104,7 +104,7 @@ def test_tables_hold_the_frames_bit_for_bit(folder: Path, trial: tuple[Instance,
     feed(instance, frames, RecordWriter(folder / "c.mcap", overwrite=True))
     record = read(folder / "c.mcap")
     for name in ("c.csv", "c.parquet"):
-        export(record, folder / name)
+        export(record, folder / name, overwrite=True)
     with (folder / "c.csv").open(newline="") as file:
         head, *rows = csv.reader(file)
     assert tuple(head) == COLUMNS

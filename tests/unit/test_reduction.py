@@ -254,7 +254,7 @@ def test_network_from_a_map_tells_what_was_lost(town: Path, capsys: pytest.Captu
     assert found["one_plus_one"]["kept_share"] == 1.0
     assert {"fate": "dropped", "reason": "one-way", "roads": 1, "length": 80.0} in found["table"]
     assert (out / "losses.png").read_bytes().startswith(b"\x89PNG")
-    assert main([*command, "--losses", str(out / "losses.svg")]) == 0
+    assert main([*command, "--overwrite", "--losses", str(out / "losses.svg")]) == 0
     picture = (out / "losses.svg").read_text()
     for words in ("the network", "kept within the tolerance (340 m)", "dropped: one-way (1, 80 m)"):
         assert words in picture

@@ -121,7 +121,7 @@ def test_the_numbers_of_the_page_are_those_of_the_file(ran: Path) -> None:
         cells = lines[entry["controller"]]
         low, high = mean.mean_interval
         assert cells[1:3] == ["4", f"{mean.mean:.4g} [{low:.4g}, {high:.4g}]"]
-        assert cells[4].startswith(f"{clean.share:.1%} [")
+        assert cells[5].startswith(f"{clean.share:.1%} [")
         row = re.search(
             rf">{entry['controller']}</th><td data-head=\"judged\">4</td><td [^>]*>([0-9.]+%)", page
         )

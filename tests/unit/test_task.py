@@ -12,7 +12,7 @@ from time import process_time
 import pytest
 
 from dubins_traffic.cli.main import main
-from dubins_traffic.cli.spec import Format
+from dubins_traffic.cli.spec import PLAIN, SUFFIXES, Format
 from dubins_traffic.errors import InputError
 from dubins_traffic.logic.exports import FORMATS, Specification
 from dubins_traffic.logic.formula import Op, conj, propositions, subformulas
@@ -179,7 +179,7 @@ def test_formats_are_those_of_the_exports() -> None:
 def test_the_rules_in_every_format(
     command: Command, tmp_path: Path, town: str, format: str, part: tuple[str, ...]
 ) -> None:
-    out = tmp_path / "out"
+    out = tmp_path / f"out{SUFFIXES.get(Format(format), PLAIN)[0]}"
     assert command(town, "--format", format, *part, "-o", str(out)) == ""
     text = out.read_text().replace("\\_", "_")
     assert ("left_ego" in text) == ("--assumption" not in part)
