@@ -260,8 +260,8 @@ def test_a_search_names_the_fault_and_tests_nothing_by_it(
     who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["falsify", "junction", "--controller", f"own.py:{who}", "-o", "out"]
-    for trials in ("32", "64"):
-        assert main([*arguments, "--trials", trials, "--resume"]) == 1
+    for trials, more in (("32", []), ("64", ["--resume"])):
+        assert main([*arguments, "--trials", trials, *more]) == 1
         out, err = capsys.readouterr()
         assert f"{trials} ended by a fault; 0 kinds of failure" in out
         assert (

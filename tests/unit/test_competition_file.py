@@ -65,7 +65,7 @@ def phases(**test: Any) -> dict[str, Any]:
     ("changes", "field", "expected"),
     [
         ({"phases": {}}, "phases", "at least 1"),
-        ({"titel": "x"}, "titel", "one of version, title"),
+        ({"titel": "x"}, "titel", "title, or one of version, about"),
         ({"ranking": {"metric": "rounds"}}, "ranking.metric", "counted_rounds"),
         ({"configurations": []}, "configurations", "at least 1"),
         ({"configurations": ["nowhere.json"]}, "configurations[0]", "configuration"),

@@ -268,7 +268,7 @@ def test_network_from_a_map_tells_what_was_lost(town: Path, capsys: pytest.Captu
     assert json.loads((out / "own-losses.json").read_text())["w"] == 1.6
     own = RoadNetwork.read(out / "own.json")
     assert clearance_faults(own, 1.6 / 0.3, 0.177, 1.6) == []
-    assert main([*again, "--w", "0.3"]) == 0
+    assert main([*again, "--overwrite", "--w", "0.3"]) == 0
     assert json.loads((out / "own-losses.json").read_text())["w"] == 0.3
 
 

@@ -92,6 +92,9 @@ def require_outputs(
 
 
 def _require(outputs: list[str], *others: str | None, overwrite: bool) -> None:
+    if not outputs:
+        return
+
     from dubins_traffic.problem.files import DOCUMENTS
     from dubins_traffic.viewer.plot import require_picture
 

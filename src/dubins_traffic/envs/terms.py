@@ -9,7 +9,7 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.rules.breach_log import RULES
+from dubins_traffic.rules import breach_log
 from dubins_traffic.scoring.verdict import EGO_RULES
 
 COSTS: Final = (*EGO_RULES, "at_fault")
@@ -52,7 +52,7 @@ the ego's breaches by rule (rule 1's collisions whoever is at fault); `at_fault`
 
 def costs_of_rules() -> Ints:
     """Return the cost, by number, of each rule, by number, (R,); -1 of a rule that the ego can't break."""
-    return np.array([EGO_RULES.index(rule) if rule in EGO_RULES else -1 for rule in RULES])
+    return np.array([EGO_RULES.index(rule) if rule in EGO_RULES else -1 for rule in breach_log.RULES])
 
 
 def weights_of(given: Mapping[str, float] | None) -> Floats:
