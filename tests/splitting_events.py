@@ -58,8 +58,6 @@ class Traffic:
         Whether the ego is `rules`; else it stands.
     alike : bool
         Whether its trials differ in their seeds only.
-    known : float or None
-        The probability of its only event, where that is known without a count.
     """
 
     name: str
@@ -67,7 +65,6 @@ class Traffic:
     below: tuple[float, ...]
     keeps_rules: bool
     alike: bool
-    known: float | None = None
 
     def begin(self, instances: Sequence[Instance]) -> Driven:
         """Begin trials of instances."""
@@ -75,9 +72,8 @@ class Traffic:
 
 
 def probability(own: Traffic, below: float) -> float | None:
-    """Return the probability of an event, known or counted; None if it is neither."""
-    counted = truths().get(f"{own.name} {below:g}", {})
-    return own.known or counted.get("probability")
+    """Return the probability of an event, as counted; None if it is not in the file."""
+    return truths().get(f"{own.name} {below:g}", {}).get("probability")
 
 
 def traffic() -> tuple[Traffic, ...]:
@@ -87,9 +83,7 @@ def traffic() -> tuple[Traffic, ...]:
     wanderers = [{"type": "wander", "name": "car", "count": 3, "parameters": bold}]
     fixed = {"goals": [[0, 1], [2, 1]], "ego": {"start": [5.8, 8.0, -1.570795]}}
     return (
-        Traffic(
-            "corridor", _changed(corridor(6), rate=10), (NEAR,), keeps_rules=False, alike=True, known=3.0**-6
-        ),
+        Traffic("corridor", _changed(corridor(6), rate=10), (NEAR,), keeps_rules=False, alike=True),
         Traffic(
             "noise",
             _junction(_nudged(arms, "lawful", {}), **fixed),

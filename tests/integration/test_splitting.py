@@ -1,4 +1,4 @@
-"""Splitting against probabilities that are known or counted, and what it says where it is of no use."""
+"""Splitting against probabilities that have been counted, and what it says where it is of no use."""
 
 import json
 import os
@@ -29,7 +29,7 @@ EVENTS = [
 
 
 @pytest.mark.parametrize(("own", "below", "truth"), EVENTS)
-def test_the_intervals_of_splitting_hold_what_is_known_or_counted(
+def test_the_intervals_of_splitting_hold_what_was_counted(
     own: Traffic, below: float, truth: float
 ) -> None:
     assert 1e-4 <= truth <= 1e-2
@@ -42,8 +42,8 @@ def test_the_intervals_of_splitting_hold_what_is_known_or_counted(
     assert held >= bar
 
 
-def test_one_probability_is_known_and_two_are_counted_in_a_million_trials() -> None:
-    assert len(EVENTS) == 3
+def test_the_probabilities_are_counted_in_a_million_trials_each() -> None:
+    assert len(EVENTS) == len(truths()) == 3
     assert all(found["trials"] >= 1_000_000 for found in truths().values())
 
 
