@@ -340,6 +340,17 @@ OPTIONS: dict[str, tuple[list[str], list[str]]] = {
     "record cut off in its header": (["score", "head.mcap"], ["head.mcap", "expected"]),
     "record with a torn middle": (["score", "torn.mcap"], ["torn.mcap", "damaged"]),
     "record of noise": (["replay", "noise.mcap"], ["noise.mcap", "expected"]),
+    "plot of an empty record": (["plot", "empty.mcap"], ["empty.mcap: not a record; expected an MCAP file"]),
+    "plot of noise": (["plot", "noise.mcap"], ["noise.mcap: not a record; expected an MCAP file"]),
+    "run of an empty record": (["run", "empty.mcap"], ["empty.mcap: not a record; expected an MCAP file"]),
+    "shrink of an empty record": (
+        ["shrink", "empty.mcap", "-o", "x.json"],
+        ["empty.mcap: not a record; expected an MCAP file"],
+    ),
+    "shrink of a record": (
+        ["shrink", "good.mcap", "-o", "x.json"],
+        ["good.mcap: a record", "expected a document in JSON"],
+    ),
     "second of two records is none": (["score", "good.mcap", "grid.json"], ["grid.json", "not a record"]),
     "unknown table": (["convert", "good.mcap", "-o", "x.xls"], ["x.xls", ".xls", ".csv"]),
     "replay in a missing folder": (["replay", "good.mcap", "-o", "no/x.html"], ["no/x.html"]),
@@ -370,6 +381,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, record: bytes) -> Pat
     (tmp_path / "good.mcap").write_bytes(record)
     (tmp_path / "head.mcap").write_bytes(record[:40])
     (tmp_path / "torn.mcap").write_bytes(torn(record))
+    (tmp_path / "empty.mcap").touch()
     (tmp_path / "noise.mcap").write_bytes(bytes(range(256)) * 4)
     return tmp_path
 

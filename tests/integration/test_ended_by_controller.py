@@ -22,6 +22,7 @@ from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.runs.single import run_trial
 
 CASES = Path(__file__).parent.parent / "cases"
+SPRING = Path(__file__).parents[2] / "examples" / "competition"
 
 CONTROLLERS = '''
 class Raises:
@@ -105,6 +106,50 @@ def test_run_and_batch_name_each(
     lines = [line for line in err.splitlines() if f"{end}: " in line]
     assert len(lines) == 2
     assert all(reason in line for line in lines)
+
+
+@WHO
+def test_a_submission(who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("entry.py").write_text(CONTROLLERS + f"\n\nController = {who}\n")
+    arguments = ["evaluate", "entry.py", "--competition", str(SPRING), "-o", "out"]
+    for _ in ("run", "read again"):
+        assert main(arguments) == 1
+        out, err = capsys.readouterr()
+        rows = [[cell.strip() for cell in line.split("│")[1:-1]] for line in out.splitlines() if "│" in line]
+        ended = [row for row in rows if row[0].isdecimal()]
+        assert [row[0] for row in ended] == ["0", "1", "2", "3"]
+        assert all((row[3], row[-1]) == ("0", "submission") for row in ended)
+        assert sum(row.count("gave up") + row.count("controller") for row in rows) == 4
+        assert "means of 4 trials, 4 ended by the controller: counted_rounds 0" in out
+        assert f"4 of 4 trials ended by a fault (4 {end}); the first: trial 0: {end}: " in err
+        assert reason in err
+    assert main([*arguments, "--json"]) == 1
+    sheet = json.loads(capsys.readouterr().out)
+    assert [own["end"] for own in sheet["trials"]] == [end] * 4
+    assert (sheet["summary"]["clean"], sheet["summary"]["counted_rounds"]) == (0.0, 0.0)
+
+
+@WHO
+def test_a_record_says_how_its_trial_ended(
+    who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for name, out in ((f"own.py:{who}", "early"), ("lanes", "whole")):
+        main(["run", "junction", "--controller", name, "--trials", "1", "--records", out])
+    whole = Path("whole/trial-0000.mcap").read_bytes()
+    Path("cut.mcap").write_bytes(whole[: len(whole) * 2 // 3])
+    told: list[str] = []
+    for record in ("early/trial-0000.mcap", "whole/trial-0000.mcap", "cut.mcap"):
+        capsys.readouterr()
+        assert main(["check", record]) == 0
+        told.append(capsys.readouterr().out)
+    (line,) = [line for line in told[0].splitlines() if "ended early" in line]
+    assert line.startswith(f"  ended early: {end}: ")
+    assert reason in line
+    assert "ended early" not in told[1]
+    assert "\n  ended early: cut off\n" in told[2]
+    assert main(["check", "--json", "early/trial-0000.mcap", "cut.mcap"]) == 0
+    found = json.loads(capsys.readouterr().out)["records"]
+    assert [own["end"] for own in found] == [end, None]
 
 
 def test_a_suite_of_cases_counts_no_crash_as_clean(capsys: pytest.CaptureFixture[str]) -> None:

@@ -165,8 +165,17 @@ def test_commands_tell_and_store_how_much_the_strategy_decided(
         first, second = json.loads(file.read_text())["entries"]
         assert first["columns"]["strategy_share"] == [0.0]
         assert "strategy_share" not in second["columns"]
-        assert main(["suite", "compare", "--suite", f"{name}.json", str(file)]) == 0
-        capsys.readouterr()
+        compare = ["suite", "compare", "--suite", f"{name}.json", f"ours={file}"]
+        assert main(compare) == 0
+        out = capsys.readouterr().out
+        assert f"\nours {Path(bad).name}: the strategy made 0.0% of the decisions.\n" in out
+        assert "rules: the strategy" not in out
+        for wrong in ("half", 2.0):
+            document = json.loads(file.read_text())
+            document["entries"][0]["columns"]["strategy_share"] = [wrong]
+            file.write_text(json.dumps(document))
+            assert main(compare) == 2
+            assert f"columns.strategy_share: not a share: got {wrong}" in capsys.readouterr().err
 
 
 def swapped(text: str) -> str:

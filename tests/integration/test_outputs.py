@@ -24,6 +24,7 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.simulators.gazebo.export import write_sdf
 from tests.recordings import make_instance
+from tests.ros import need_ros
 
 MINE = "class Mine:\n    'A controller that took a week.'\n"
 COMMANDS = {
@@ -96,6 +97,37 @@ def test_a_command_replaces_nothing_that_it_was_not_told_to(
     assert held(place) == before
     assert main([*words, "-o", f"new{suffix}", "--overwrite"]) == 0
     assert len((place / f"new{suffix}").read_bytes()) == len(first)
+
+
+@pytest.mark.parametrize("form", [[], ["--cpp"]])
+def test_messages_for_ros_replace_nothing_unasked(
+    form: list[str], place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def files() -> dict[str, bytes]:
+        return {str(path): path.read_bytes() for path in Path("ros").rglob("*") if path.is_file()}
+
+    need_ros()
+    words = ["ros1", "messages", "ros", *form]
+    assert main(words) == 0
+    made = files()
+    assert len(made) > 5
+    mine = max(made)
+    Path(mine).write_text(MINE)
+    for other in made.keys() - {mine}:
+        Path(other).unlink()
+    capsys.readouterr()
+    assert main(words) == 2
+    told = capsys.readouterr().err
+    assert told == f"dubins-traffic: {mine}: exists already; expected a new name, or --overwrite\n"
+    assert files() == {mine: MINE.encode()}
+    assert main([*words, "--overwrite"]) == 0
+    assert files().keys() == made.keys()
+    assert Path(mine).read_bytes() == made[mine]
+    Path(mine).unlink()
+    Path(mine).symlink_to(place / "my.py.txt")
+    (place / "my.py.txt").write_text(MINE)
+    assert main([*words, "--overwrite"]) == 2
+    assert (place / "my.py.txt").read_text() == MINE
 
 
 @pytest.mark.usefixtures("place")

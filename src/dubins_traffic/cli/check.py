@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from dubins_traffic.record.sink import Ending
     from dubins_traffic.scoring.score import Score
     from dubins_traffic.scoring.verdict import Verdict
 
@@ -35,14 +36,15 @@ def check(
     from dubins_traffic.scoring.score import ScoreSheet, score
     from dubins_traffic.verification.contacts import from_poses
 
-    scores = [(record, score(from_poses(load_record(record)))) for record in records]
+    read = [(name, from_poses(load_record(name))) for name in records]
+    scores = [(name, record.ending, score(record)) for name, record in read]
     if json:
-        found = [_document(record, scored) for record, scored in scores]
+        found = [_document(record, scored) for record, _, scored in scores]
         print(json_text.dumps({"records": found}, indent=2))
     else:
-        for record, scored in scores:
-            _show(shown(record), scored)
-    notice = assumption_notice(*ScoreSheet(tuple(scored for _, scored in scores)).assumption_broken)
+        for record, ending, scored in scores:
+            _show(shown(record), ending, scored)
+    notice = assumption_notice(*ScoreSheet(tuple(scored for *_, scored in scores)).assumption_broken)
     if notice:
         faults.tell(notice)
 
@@ -51,6 +53,7 @@ def _document(record: str, score: Score) -> dict[str, Any]:
     verdict = score.verdict
     document = {
         "record": record,
+        "end": score.end,
         "clean": None if verdict is None else verdict.clean,
         "verdict": None if verdict is None else verdict.verdict.value,
         "near": None if verdict is None else verdict.near,
@@ -64,11 +67,12 @@ def _document(record: str, score: Score) -> dict[str, Any]:
     return document
 
 
-def _show(record: str, score: Score) -> None:
-    """Print a verdict for people: one line, why, the formulas' verdicts, and a table of the breaches."""
+def _show(record: str, ending: Ending | None, score: Score) -> None:
+    """Print a verdict for people: one line, an early end, why, the formulas' verdicts, a table of the breaches."""
     from rich.console import Console
 
     from dubins_traffic.cli.tables import verdict_text
+    from dubins_traffic.record.sink import End
 
     console = Console(highlight=False, soft_wrap=True)
     verdict = score.verdict
@@ -76,6 +80,8 @@ def _show(record: str, score: Score) -> None:
         console.print(f"{record}: not judged, the problem does not ask for the rules", markup=False)
     else:
         _show_verdict(record, verdict, console)
+    if ending is None or ending.end != End.DURATION:
+        console.print(f"  ended early: {'cut off' if ending is None else shown(str(ending))}", markup=False)
     for found in score.formulas:
         console.print(f"  {shown(found.name)}: {verdict_text(found)}", markup=False)
     if verdict is not None and verdict.violations:

@@ -113,6 +113,7 @@ def reveal(file: File, phase: PhaseName, key_file: KeyFile = None) -> None:
     """Publish the seeds of a phase that has closed, so that anybody can run its trials again."""
     from dubins_traffic.competition import sealing
 
+    sealing.cipher_class()
     own = _phase(file, phase)
     options.tell(str(sealing.reveal(own, _key(own, key_file))))
 

@@ -124,6 +124,7 @@ def _show(done: Evaluation, phase: Phase, folder: Path) -> None:
     from rich.table import Table
 
     from dubins_traffic.competition.visibility import summary, tail
+    from dubins_traffic.record.sink import BY_CONTROLLER
 
     several = len(phase.configurations) > 1
     table = Table(title=f"{phase.name}, submission {done.submission[:12]}")
@@ -134,7 +135,7 @@ def _show(done: Evaluation, phase: Phase, folder: Path) -> None:
         place = (phase.place(own.number)[0].name,) if several else ()
         cells = [own.row[name] for name in ("rounds", "counted_rounds", "verdict", "collisions")]
         texts = ["" if cell is None else str(cell) for cell in cells]
-        table.add_row(str(own.number), *place, own.end, *texts, own.owner or "")
+        table.add_row(str(own.number), *place, own.end.replace("_", " "), *texts, own.owner or "")
     console = Console(highlight=False, markup=False)
     console.print(table)
     faulty = [own for own in done.results if own.owner is not None]
@@ -142,5 +143,7 @@ def _show(done: Evaluation, phase: Phase, folder: Path) -> None:
         console.print(tail(faulty[0].log, phase.model.log_lines))
     means = summary(phase, done.results) or {"trials": 0}
     told = ", ".join(f"{name} {value:.4g}" for name, value in means.items() if name != "trials")
-    console.print(f"means of {means['trials']} trials: {told}")
+    quits = sum(own.end in BY_CONTROLLER for own in done.results)
+    ended = f", {quits} ended by the controller" if quits else ""
+    console.print(f"means of {means['trials']} trials{ended}: {told}")
     options.tell(str(folder / "results.jsonl"))

@@ -18,11 +18,12 @@ def ros1(
         Path, typer.Argument(metavar="DIR", help="Where to write, made if missing.", show_default=False)
     ],
     cpp: Annotated[bool, typer.Option("--cpp", help="C++ headers instead of Python packages.")] = False,
+    overwrite: options.Replace = False,
 ) -> None:
     """Write the message packages that Debian lacks: gazebo_msgs, dubins_traffic_msgs, integrator_chains_msgs."""
     from dubins_traffic.transports.ros1.messages import write_cpp, write_python
 
-    (write_cpp if cpp else write_python)(folder)
+    (write_cpp if cpp else write_python)(folder, overwrite=overwrite)
     options.tell(str(folder))
 
 

@@ -145,7 +145,6 @@ def run(
     from dubins_traffic.campaign import table
     from dubins_traffic.suites import cases
     from dubins_traffic.suites.comparing import open_sources
-    from dubins_traffic.suites.results import shares
     from dubins_traffic.suites.suite import load_suite
     from dubins_traffic.suites.writing import PAGE, write_results
 
@@ -160,7 +159,6 @@ def run(
     report = Path(folder) / "report"
     print(write_results(found, open_sources([str(path)]), report, overwrite=True), end="")
     options.tell(str(path), str(report / PAGE))
-    print("".join(f"{line}\n" for line in shares(path)), end="")
     if found.model.cases is not None:
         faults.fail_if(cases.faulty(Path(folder), found))
     elif found.model.campaign is not None:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, Final, cast, get_type_hints
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.cells import Cell, Manoeuvre
-from dubins_traffic.files import read_text, require_output, write_text
+from dubins_traffic.files import require_output, write_text
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
-from dubins_traffic.problem.files import DOCUMENTS, parse_json
+from dubins_traffic.problem.files import DOCUMENTS, parse_json, read_source
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -75,7 +75,7 @@ def read_case(path: str | os.PathLike[str]) -> Case:
         If there is no such file, or it holds no case.
     """
     name = os.fspath(path)
-    document = parse_json(read_text(name), name)
+    document = parse_json(read_source(name).text, name)
     return case_of(instance_from_document(document, name), name)
 
 

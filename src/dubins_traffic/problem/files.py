@@ -12,7 +12,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Any, cast
 
-from dubins_traffic.errors import InputError
+from dubins_traffic.errors import InputError, RecordError
 from dubins_traffic.files import decoded, is_stream, packed, read_bytes, require_output, write_text
 from dubins_traffic.roads.formats.registry import is_map
 
@@ -60,6 +60,8 @@ def source_of(data: bytes, name: str) -> Source:
     """Return `data`, the bytes of the file called `name`, as a text; the exceptions are those of `read_source`."""
     if data.startswith(MCAP_MAGIC):
         raise _refuse_record(name)
+    if name.endswith(".mcap"):
+        raise RecordError("not a record", file=name, expected="an MCAP file, or another name")
     folder = None if name == STANDARD_INPUT or is_stream(name) else Path(name).parent
     return Source(name, folder, decoded(data, name))
 

@@ -12,6 +12,7 @@ from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import exists
+from dubins_traffic.scoring.registry import STRATEGY_SHARE
 from dubins_traffic.suites.result_model import ResultModel, TrialsEntry, WallModel
 from dubins_traffic.suites.results import find_results, load_results, part
 from dubins_traffic.suites.suite import SHORT, Suite
@@ -138,6 +139,27 @@ def named_entries(sources: Sequence[Source]) -> list[Named]:
                 )
             found.append(Named(name, entry, source))
     return found
+
+
+def shares(sources: Sequence[Source]) -> list[str]:
+    """Return a sentence for each entry that played a strategy of another tool: which share of decisions it made.
+
+    Raises
+    ------
+    InputError
+        If a name stands twice, or a share is none.
+    """
+    lines: list[str] = []
+    for one in named_entries(sources):
+        known = [value for value in one.entry.columns.get(STRATEGY_SHARE, ()) if value is not None]
+        for value in known:
+            if isinstance(value, str) or not 0 <= value <= 1:
+                field, file = f"{one.entry.controller}.columns.{STRATEGY_SHARE}", str(one.source.path)
+                raise InputError("not a share", file=file, field=field, value=value, expected="0 to 1")
+        if known:
+            share = sum(map(float, known)) / len(known)
+            lines.append(f"{one.name}: the strategy made {share:.1%} of the decisions.")
+    return lines
 
 
 def _part(campaign: Campaign, index: int, one: Named) -> Any:

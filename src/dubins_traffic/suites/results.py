@@ -62,18 +62,6 @@ def played(columns: Mapping[str, Sequence[Any]]) -> dict[str, Sequence[Any]]:
     }
 
 
-def shares(path: Path) -> list[str]:
-    """Return a line for each entry of a file of results that played a strategy of another tool: how much it decided."""
-    lines: list[str] = []
-    for entry in load_results(path)[0].entries:
-        known = [float(value) for value in entry.columns.get(STRATEGY_SHARE, ()) if value is not None]
-        if known:
-            lines.append(
-                f"{entry.controller}: the strategy made {sum(known) / len(known):.1%} of the decisions"
-            )
-    return lines
-
-
 def save(suite: Suite, folder: Path, found: Mapping[str, Any], seconds: Mapping[str, Any]) -> Path:
     """Write a file of results and that of the seconds; return the path of the first."""
     document: dict[str, Any] = {

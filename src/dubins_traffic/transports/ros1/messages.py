@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import shutil
 import subprocess
 import tempfile
-from collections.abc import Mapping, Sequence
-from functools import cache
+from collections.abc import Generator, Mapping, Sequence
+from functools import cache, partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,6 +16,7 @@ from typing import Any
 from platformdirs import user_cache_path
 
 from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.files import exists, make_folder, replace_file, require_output
 from dubins_traffic.transports.ros1.debian import MissingRosError, add_generated, ros
 
 DEFINITIONS = Path(__file__).parent / "definitions"
@@ -103,46 +105,67 @@ def _generated() -> Path:
     return folder
 
 
-def write_python(folder: Path) -> None:
+@contextlib.contextmanager
+def _put(folder: Path, suffix: str, *, overwrite: bool) -> Generator[Path]:
+    """Let files be made in the folder given, elsewhere; then write them below `folder`, if none may not be written."""
+    with tempfile.TemporaryDirectory() as made:
+        yield Path(made)
+        found = sorted(path.relative_to(made) for path in Path(made).rglob(f"*{suffix}"))
+        for name in found:
+            if exists(folder / name):
+                require_output(folder / name, "messages", (suffix,), overwrite=overwrite)
+        for parent in {name.parent for name in found}:
+            make_folder(folder / parent, "messages")
+        for name in found:
+            replace_file(folder / name, partial(shutil.copyfile, Path(made) / name))
+
+
+def write_python(folder: Path, *, overwrite: bool = False) -> None:
     """Write our messages as Python packages below `folder`.
 
     Raises
     ------
+    InputError
+        If a file is there and `overwrite` is not given, or it can't be written.
     MissingRosError
         If Debian's generator or the definitions that ours use are not installed.
     """
     generator, write_modules = ros("genpy.generator"), ros("genpy.generate_initpy").write_modules
     search = _search_path()
-    for package in packages():
-        for kind, make in (("msg", generator.MsgGenerator), ("srv", generator.SrvGenerator)):
-            files = sorted(map(str, (DEFINITIONS / package / kind).glob("*." + kind)))
-            if not files:
-                continue
-            target = folder / package / kind
-            target.mkdir(parents=True, exist_ok=True)
-            if make().generate_messages(package, files, str(target), search):
-                raise DubinsTrafficError(f"genpy could not generate {package}")
-            write_modules(str(target))
-        (folder / package / "__init__.py").touch()
+    with _put(folder, ".py", overwrite=overwrite) as made:
+        for package in packages():
+            for kind, make in (("msg", generator.MsgGenerator), ("srv", generator.SrvGenerator)):
+                files = sorted(map(str, (DEFINITIONS / package / kind).glob("*." + kind)))
+                if not files:
+                    continue
+                target = made / package / kind
+                target.mkdir(parents=True)
+                if make().generate_messages(package, files, str(target), search):
+                    raise DubinsTrafficError(f"genpy could not generate {package}")
+                write_modules(str(target))
+            (made / package / "__init__.py").touch()
 
 
-def write_cpp(folder: Path) -> None:
+def write_cpp(folder: Path, *, overwrite: bool = False) -> None:
     """Write our messages as C++ headers below `folder`, for a compiler's -I.
 
     Raises
     ------
+    InputError
+        If a file is there and `overwrite` is not given, or it can't be written.
     MissingRosError
         If Debian's generator for C++ is not installed.
     """
     if not GENCPP.is_file():
         raise MissingRosError("python3-gencpp")
     include = [f"-I{name}:{path}" for name, paths in _search_path().items() for path in paths]
-    for file in definitions():
-        package = file.parent.parent.name
-        target = folder / package
-        target.mkdir(parents=True, exist_ok=True)
-        command = ["/usr/bin/python3", str(GENCPP), str(file), "-p", package, "-o", str(target), *include]
-        _run([*command, "-e", str(SHARE / "gencpp")])
+    with _put(folder, ".h", overwrite=overwrite) as made:
+        for file in definitions():
+            package = file.parent.parent.name
+            target = made / package
+            target.mkdir(exist_ok=True)
+            command = ["/usr/bin/python3", str(GENCPP), str(file), "-p", package, "-o", str(target), *include]
+            _run([*command, "-e", str(SHARE / "gencpp")])
 
 
 def _run(command: Sequence[str]) -> None:
