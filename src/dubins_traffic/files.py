@@ -150,26 +150,6 @@ def write_text(path: str | Path, text: str, *, durable: bool = False) -> None:
     replace_file(Path(path), lambda neighbour: neighbour.write_bytes(data), durable=durable)
 
 
-def append_text(path: Path, text: str) -> None:
-    """Add `text` as UTF-8 to the end of a file, made if missing; once this returns it survives a loss of power.
-
-    Raises
-    ------
-    InputError
-        If it can't be written; a part of it may be there then.
-    """
-    fresh = not path.exists()
-    try:
-        with path.open("ab") as file:
-            file.write(text.encode())
-            file.flush()
-            os.fsync(file.fileno())
-        if fresh:
-            _flush(path.parent)
-    except OSError as error:
-        raise InputError(f"can't be written ({error.strerror or error})", file=str(path)) from error
-
-
 def replace_file(path: Path, write: Callable[[Path], object], *, durable: bool = False) -> None:
     """Let `write` make a temporary neighbour of `path`, then put it in the place of `path` in one step.
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import dubins_traffic as dt
+from dubins_traffic.errors import InputError
 from dubins_traffic.falsification import crew, search
 from dubins_traffic.falsification.genome import Genome
 from dubins_traffic.falsification.journal import Journal, key_of
@@ -134,7 +135,16 @@ def test_a_damaged_line_is_passed_over(tmp_path: Path, place: int) -> None:
     again = Journal(path)
     missed = [k for k in range(12) if again.known(key_of(k, genome)) is None]
     assert missed in ([hit], [hit, hit + 1])
+    assert path.read_bytes() == data, "nothing is written before there is something to write"
+    again.settle(0)
     assert kept(tmp_path) == 12 - len(missed)
+
+
+def test_a_file_of_that_name_that_is_no_journal_is_left_alone(tmp_path: Path) -> None:
+    (tmp_path / "journal.txt").write_text("Monday: rain.\n")
+    with pytest.raises(InputError, match="holds files that are no search's"):
+        dt.falsify("junction", folder=tmp_path, trials=1, duration=2.0)
+    assert (tmp_path / "journal.txt").read_text() == "Monday: rain.\n"
 
 
 def test_a_search_that_is_interrupted_before_it_has_used_its_journal_keeps_it(

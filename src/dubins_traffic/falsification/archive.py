@@ -114,7 +114,7 @@ def opened(folder: Path, settings: Any, *, resume: bool) -> Generator[Archive]:
     with locked(folder):
         archive = Archive(folder)
         state = archive.state()
-        if state is None and (archive.cases or (folder / REPORT).exists()):
+        if state is None and (archive.cases or any((folder / name).exists() for name in (REPORT, JOURNAL))):
             raise InputError("holds files that are no search's", file=str(folder), expected="a new folder")
         if state is not None and not resume:
             raise InputError(

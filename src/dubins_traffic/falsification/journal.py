@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import time
 import zlib
 from collections.abc import Iterable
@@ -11,8 +12,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign.chunks import KEPT_S
+from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.trying import Tried
-from dubins_traffic.files import append_text, read_bytes, write_text
+from dubins_traffic.files import read_bytes, write_text
 
 if TYPE_CHECKING:
     from dubins_traffic.falsification.genome import Genome
@@ -44,8 +46,7 @@ class Journal:
             if checksum == _checksum(text):
                 number, digest, _ = json.loads(text)
                 self._lines[number, digest] = line
-        if len(self._lines) < len(told):
-            self._write()
+        self._sound = 0 < len(self._lines) == len(told)
 
     def known(self, key: Key) -> Tried | None:
         """Return what came of a trial; None if it has not been finished."""
@@ -65,9 +66,7 @@ class Journal:
             self._lines[key] = line = f"{_checksum(text)} {text}"
             self._waiting.append(line)
         if time.monotonic() - self._written > KEPT_S:
-            append_text(self._path, "".join(self._waiting))
-            self._waiting.clear()
-            self._written = time.monotonic()
+            self._append()
 
     def settle(self, trials: int) -> None:
         """Forget the first `trials` trials, which the state knows, and write down all others.
@@ -80,12 +79,30 @@ class Journal:
         self._lines = {key: line for key, line in self._lines.items() if key[0] >= trials}
         self._write()
 
-    def _write(self) -> None:
+    def _append(self) -> None:
+        """Write what waits behind the lines that are there, if all are as they were written."""
+        if not self._sound:
+            self._write()
+            return
+        try:
+            with self._path.open("ab") as file:
+                file.write("".join(self._waiting).encode())
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise InputError(f"can't be written ({error.strerror})", file=str(self._path)) from error
         self._waiting.clear()
+        self._written = time.monotonic()
+
+    def _write(self) -> None:
+        """Write all lines anew."""
         if self._lines:
             write_text(self._path, "".join(self._lines.values()), durable=True)
         else:
             self._path.unlink(missing_ok=True)
+        self._sound = bool(self._lines)
+        self._waiting.clear()
+        self._written = time.monotonic()
 
 
 def _checksum(text: str) -> str:

@@ -157,7 +157,7 @@ class Laboratory:
             first = 0
             while first < len(own):
                 some = own[first : first + self._count(own[first:])]
-                yield self._taken(self._asked(some), places)
+                yield self._taken(self._steered(some), places)
                 first += len(some)
         shared = set(map(id, together))
         for own in instances:
@@ -194,7 +194,7 @@ class Laboratory:
         self._check()
         return group
 
-    def _asked(self, instances: Sequence[Instance]) -> Group:
+    def _steered(self, instances: Sequence[Instance]) -> Group:
         """Return trials that have been run, whose controllers were asked in every tick."""
         shared = self._shared
         if shared is not None:
