@@ -14,7 +14,7 @@ import dubins_traffic as dt
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification import crew, search
 from dubins_traffic.falsification.genome import Genome
-from dubins_traffic.falsification.journal import Journal, key_of
+from dubins_traffic.falsification.journal import Journal
 from dubins_traffic.falsification.sampling import Source, prepared
 from dubins_traffic.falsification.trying import Laboratory, Tried, in_order
 from dubins_traffic.problem.configuration import load_config
@@ -106,15 +106,14 @@ def test_what_came_of_a_trial_is_read_as_it_was_kept(tmp_path: Path) -> None:
     tried = in_order(Laboratory("simple").attempt(source.build(genomes)))
     tried.append(Tried(True, True, {"1.road": float("inf")}, (), fault="raised: a\nb"))
     genomes.append(Genome(3, 3))
-    keys = list(map(key_of, range(25), genomes))
     journal = Journal(tmp_path / "journal.txt")
-    journal.keep(zip(keys, tried, strict=True))
+    journal.keep(zip(range(25), genomes, tried, strict=True))
     journal.settle(0)
     again = Journal(tmp_path / "journal.txt")
-    assert [again.known(key) for key in keys] == tried
+    assert list(map(again.known, range(25), genomes)) == tried
     assert any(own.cells for own in tried)
     assert any(own.exercised for own in tried)
-    assert again.known(key_of(0, genomes[1])) is None, "another trial of that number"
+    assert again.known(0, genomes[1]) is None, "another trial of that number"
     again.settle(24)
     assert kept(tmp_path) == 1
     again.settle(25)
@@ -126,14 +125,14 @@ def test_a_damaged_line_is_passed_over(tmp_path: Path, place: int) -> None:
     genome = Genome(3, 3)
     path = tmp_path / "journal.txt"
     journal = Journal(path)
-    journal.keep((key_of(k, genome), Tried(False, False, {"1.road": 0.5 * k}, ())) for k in range(12))
+    journal.keep((k, genome, Tried(False, False, {"1.road": 0.5 * k}, ())) for k in range(12))
     journal.settle(0)
     data = bytearray(path.read_bytes())
     hit = data[: place % len(data)].count(b"\n")
     data[place % len(data)] ^= 0x81
     path.write_bytes(data)
     again = Journal(path)
-    missed = [k for k in range(12) if again.known(key_of(k, genome)) is None]
+    missed = [k for k in range(12) if again.known(k, genome) is None]
     assert missed in ([hit], [hit, hit + 1])
     assert path.read_bytes() == data, "nothing is written before there is something to write"
     again.settle(0)

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 
 Key = tuple[int, str]
 """The number of a trial, and the hash of its genome."""
+Finished = tuple[int, "Genome", Tried]
+"""The number of a trial, its genome, and what came of it."""
 
 
 class Journal:
@@ -38,7 +40,7 @@ class Journal:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._lines: dict[Key, str] = {}
-        self._waiting: list[str] = []
+        self._waiting: list[Finished] = []
         self._written = time.monotonic()
         told = read_bytes(path).decode(errors="replace").splitlines(keepends=True) if path.is_file() else []
         for line in told:
@@ -48,12 +50,12 @@ class Journal:
                 self._lines[number, digest] = line
         self._sound = 0 < len(self._lines) == len(told)
 
-    def known(self, key: Key) -> Tried | None:
-        """Return what came of a trial; None if it has not been finished."""
-        line = self._lines.get(key)
+    def known(self, number: int, genome: Genome) -> Tried | None:
+        """Return what came of a trial; None if it is not here."""
+        line = self._lines.get(_key(number, genome)) if self._lines else None
         return None if line is None else Tried.from_json(json.loads(line.partition(" ")[2])[2])
 
-    def keep(self, finished: Iterable[tuple[Key, Tried]]) -> None:
+    def keep(self, finished: Iterable[Finished]) -> None:
         """Keep trials that are finished: at once if the last ones were written `KEPT_S` ago, else with the next ones.
 
         Raises
@@ -61,12 +63,14 @@ class Journal:
         InputError
             If the journal can't be written.
         """
-        for key, tried in finished:
-            text = json.dumps([*key, tried.to_json()]) + "\n"
-            self._lines[key] = line = f"{_checksum(text)} {text}"
-            self._waiting.append(line)
+        self._waiting += finished
         if time.monotonic() - self._written > KEPT_S:
             self._append()
+
+    def taken(self) -> None:
+        """A generation has been taken over: what of it is not written yet is left to the state that is written next."""
+        self._waiting.clear()
+        self._written = time.monotonic()
 
     def settle(self, trials: int) -> None:
         """Forget the first `trials` trials, which the state knows, and write down all others.
@@ -76,22 +80,34 @@ class Journal:
         InputError
             If the journal can't be written.
         """
+        self._take_lines()
         self._lines = {key: line for key, line in self._lines.items() if key[0] >= trials}
         self._write()
 
+    def _take_lines(self) -> str:
+        """Return the lines of what waits, which are lines like the others from now on."""
+        lines: list[str] = []
+        for number, genome, tried in self._waiting:
+            key = _key(number, genome)
+            text = json.dumps([*key, tried.to_json()]) + "\n"
+            self._lines[key] = line = f"{_checksum(text)} {text}"
+            lines.append(line)
+        self._waiting.clear()
+        return "".join(lines)
+
     def _append(self) -> None:
         """Write what waits behind the lines that are there, if all are as they were written."""
+        lines = self._take_lines()
         if not self._sound:
             self._write()
             return
         try:
             with self._path.open("ab") as file:
-                file.write("".join(self._waiting).encode())
+                file.write(lines.encode())
                 file.flush()
                 os.fsync(file.fileno())
         except OSError as error:
             raise InputError(f"can't be written ({error.strerror})", file=str(self._path)) from error
-        self._waiting.clear()
         self._written = time.monotonic()
 
     def _write(self) -> None:
@@ -101,7 +117,6 @@ class Journal:
         else:
             self._path.unlink(missing_ok=True)
         self._sound = bool(self._lines)
-        self._waiting.clear()
         self._written = time.monotonic()
 
 
@@ -109,6 +124,5 @@ def _checksum(text: str) -> str:
     return f"{zlib.crc32(text.encode()):08x}"
 
 
-def key_of(number: int, genome: Genome) -> Key:
-    """Return what a journal knows a trial by."""
+def _key(number: int, genome: Genome) -> Key:
     return number, hashlib.sha256(json.dumps(genome.to_json()).encode()).hexdigest()

@@ -25,7 +25,6 @@ from dubins_traffic.falsification.coverage_page import coverage_page
 from dubins_traffic.falsification.crew import Crew, crew_of, name_of
 from dubins_traffic.falsification.found import Found
 from dubins_traffic.falsification.genome import Genome
-from dubins_traffic.falsification.journal import key_of
 from dubins_traffic.falsification.judging import case_in
 from dubins_traffic.falsification.least import Least
 from dubins_traffic.falsification.remote import Remote
@@ -114,6 +113,7 @@ class Search:
             for cell, (number, case) in fresh.items():
                 self.archive.keep(cell, case)
                 self.found_in[cell] = number
+            self.archive.journal.taken()
         self._tell()
 
     def _tell(self) -> None:
@@ -123,18 +123,20 @@ class Search:
     def _tried(self, numbers: range, genomes: Sequence[Genome], instances: Sequence[Instance]) -> list[Tried]:
         """Return what comes of trials; those that are in the journal are not run again, the others go there."""
         journal = self.archive.journal
-        keys = list(map(key_of, numbers, genomes))
-        found = {k: known for k, key in enumerate(keys) if (known := journal.known(key)) is not None}
-        left = [k for k in range(len(keys)) if k not in found]
+        count = len(numbers)
+        known = map(journal.known, numbers, genomes)
+        found = {k: own for k, own in enumerate(known) if own is not None}
+        left = [k for k in range(count) if k not in found]
         self.finished = self.counts.trials + len(found)
         for part in self._crew.run([instances[k] for k in left]):
             with WHOLE:
-                journal.keep((keys[left[k]], own) for k, own in part.items())
-                found |= {left[k]: own for k, own in part.items()}
+                came = {left[k]: own for k, own in part.items()}
+                journal.keep((numbers[k], genomes[k], own) for k, own in came.items())
+                found |= came
                 self.finished += len(part)
-            if len(found) < len(keys):
+            if len(found) < count:
                 self._tell()
-        return [found[k] for k in range(len(keys))]
+        return [found[k] for k in range(count)]
 
     def _take_all(
         self, numbers: range, genomes: Sequence[Genome], instances: Sequence[Instance], tried: Sequence[Tried]
