@@ -36,9 +36,10 @@ from benchmarks.table import Row, show
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.falsification import search
 from dubins_traffic.falsification.crew import Here
+from dubins_traffic.falsification.found import Found
 from dubins_traffic.falsification.intervals import clopper_pearson
-from dubins_traffic.falsification.search import GENERATION, Found, falsify
-from dubins_traffic.falsification.trying import Findings
+from dubins_traffic.falsification.search import GENERATION, falsify
+from dubins_traffic.falsification.trying import Tried
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
@@ -173,7 +174,7 @@ class _Watched(Here):
 
     seen: list[Instance]
 
-    def run(self, instances: Sequence[Instance]) -> Findings:
+    def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
         """Run the trials of instances."""
         self.seen += instances
         return super().run(instances)

@@ -136,7 +136,7 @@ def unpacked(data: bytes, name: str) -> bytes:
     return found
 
 
-def write_text(path: str | Path, text: str) -> None:
+def write_text(path: str | Path, text: str, *, durable: bool = False) -> None:
     """Write `text` as UTF-8, whole or not at all; packed by gzip where the path ends in ``.gz``.
 
     Raises
@@ -147,7 +147,7 @@ def write_text(path: str | Path, text: str) -> None:
     data = text.encode("utf-8")
     if Path(path).suffix.lower() == GZIP:
         data = gzip.compress(data, mtime=0)
-    replace_file(Path(path), lambda neighbour: neighbour.write_bytes(data))
+    replace_file(Path(path), lambda neighbour: neighbour.write_bytes(data), durable=durable)
 
 
 def replace_file(path: Path, write: Callable[[Path], object], *, durable: bool = False) -> None:

@@ -18,7 +18,7 @@ from dubins_traffic.falsification.genome import Genome
 from dubins_traffic.falsification.passages import find_passages
 from dubins_traffic.falsification.sampling import Source, Stream, prepared
 from dubins_traffic.falsification.strategies import make
-from dubins_traffic.falsification.trying import Tried
+from dubins_traffic.falsification.trying import Tried, with_passages
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.starts import gap_radius
@@ -65,11 +65,18 @@ def test_a_passage_is_what_the_ego_did_in_the_disc(last: tuple[int, int], manoeu
     assert found.cell("1.collision", 0, 5) == Cell("1.collision", manoeuvre, 4)
     assert found.cell("3.stop", 0, 3) == Cell("3.stop", manoeuvre, 4)
     assert found.cell("1.collision", 0, 2) == Cell("1.collision", Manoeuvre.DRIVING, 4)
-    assert not found.exercised(3, np.array([False])).any(), "a trial that ended by a fault tests nothing"
-    tested = found.exercised(3, np.array([True]))
-    assert tested[Cell("3.order", manoeuvre, 4).number] == 1
-    assert tested[Cell("3.clear", manoeuvre, 4).number] == 1
-    assert tested[Cell("2.left", Manoeuvre.DRIVING, 4).number] == 0
+    (tested,) = found.exercised(1, 3)
+    assert tested.count(Cell("3.order", manoeuvre, 4).number) == 1
+    assert tested.count(Cell("3.clear", manoeuvre, 4).number) == 1
+    assert tested.count(Cell("2.left", Manoeuvre.DRIVING, 4).number) == 0
+    assert tested == tuple(sorted(tested))
+    sound, faulty = with_passages(
+        [Tried(False, False, {}, ()), Tried(False, True, {}, ())],
+        find_passages(lane.repeat(2, 0), bits.repeat(2, 0), np.array([9, 9]), [network, network]),
+        draw(JUNCTION, 1, 0),
+    )
+    assert sound.exercised == tested
+    assert faulty.exercised == (), "a trial that ended by a fault tests nothing"
 
 
 def test_an_empty_cell_stands_in_the_coverage() -> None:

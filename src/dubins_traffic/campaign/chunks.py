@@ -140,11 +140,18 @@ class Pace:
         self._answer_s[chunk.controller] = answer_s
 
     def _trials(self, chunk: Chunk) -> int:
-        answer_s = self._answer_s.get(chunk.controller)
-        if answer_s is None:
-            return 1
-        each_s = answer_s * ticks(chunk.configuration)
-        return max(1, int(KEPT_S / each_s)) if each_s * chunk.count > KEPT_S else chunk.count
+        return fitting(self._answer_s.get(chunk.controller), ticks(chunk.configuration), chunk.count)
+
+
+def fitting(answer_s: float | None, ticks: float, count: int) -> int:
+    """Return how many of `count` trials are run before what is finished is kept, about every `KEPT_S`.
+
+    It is one while nobody knows how long their controller takes for an answer, `answer_s` seconds in each of `ticks`.
+    """
+    if answer_s is None:
+        return 1
+    each_s = answer_s * ticks
+    return max(1, int(KEPT_S / each_s)) if each_s * count > KEPT_S else count
 
 
 def ticks(settled: Configuration) -> float:

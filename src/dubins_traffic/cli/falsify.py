@@ -16,8 +16,9 @@ if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
 
     from dubins_traffic.falsification.coverage import Row
+    from dubins_traffic.falsification.found import Found
     from dubins_traffic.falsification.remote import Remote
-    from dubins_traffic.falsification.search import Found, Search
+    from dubins_traffic.falsification.search import Search
 
 EXAMPLES = options.examples(
     "falsify junction --controller lanes --trials 2000 -o found",
@@ -116,7 +117,7 @@ def falsify(
 
             def heard(own: Search) -> None:
                 seen[:] = [own]
-                tell(own.counts.trials, trials or own.counts.trials)
+                tell(own.finished, trials or own.finished)
 
             found = search(
                 configuration, driver, output, rules=rule or (), formula=formula, least_score=least_score,
@@ -124,7 +125,7 @@ def falsify(
                 workers=workers, ray=ray, resume=resume, progress=heard,
             )  # fmt: skip
     except KeyboardInterrupt:
-        faults.tell(f"interrupted after {seen[0].counts.trials if seen else 0} trials; --resume goes on")
+        faults.tell(f"interrupted after {seen[0].finished if seen else 0} trials; --resume goes on")
         raise typer.Exit(faults.FAILED) from None
     _show(found, json=json)
     options.tell(output, str(found.page))

@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.case import Case, read_case
+from dubins_traffic.falsification.journal import Journal
 from dubins_traffic.files import locked, make_folder, read_text, write_text
 from dubins_traffic.problem.files import parse_json
 
@@ -22,6 +23,8 @@ PAGE: Final = "coverage.html"
 """What was put to the test and found, to be read."""
 STATE: Final = "state.json"
 """Where the search goes on."""
+JOURNAL: Final = "journal.txt"
+"""The trials that it has finished since."""
 
 
 class Archive:
@@ -31,10 +34,13 @@ class Archive:
     ----------
     cases : dict of str to Case
         The cases by the names of their cells.
+    journal : Journal
+        The trials that the search has finished since its state was written.
     """
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
+        self.journal = Journal(folder / JOURNAL)
         self.cases = {path.stem: read_case(path) for path in files(folder)}
 
     def keep(self, name: str, case: Case) -> Path:
@@ -48,9 +54,9 @@ class Archive:
         """Forget all cases but some: what a search that was killed had found after it last wrote down where it was."""
         self.cases = {name: case for name, case in self.cases.items() if name in names}
 
-    def write(self, name: str, document: Any, indent: int | None = 1) -> None:
+    def write(self, name: str, document: Any) -> None:
         """Write a document as JSON; equal documents give equal bytes."""
-        write_text(self.folder / name, json.dumps(document, indent=indent, allow_nan=False) + "\n")
+        write_text(self.folder / name, json.dumps(document, indent=1, allow_nan=False) + "\n")
 
     def tell(self, page: str) -> None:
         """Write the page of the search."""
@@ -70,8 +76,9 @@ class Archive:
         return found["state"]
 
     def remember(self, state: Mapping[str, Any]) -> None:
-        """Write down where the search goes on."""
-        self.write(STATE, {"sha256": _digest(state), "state": state}, indent=None)
+        """Write down where the search goes on; once this returns, it survives a loss of power."""
+        whole = {"sha256": _digest(state), "state": state}
+        write_text(self.folder / STATE, json.dumps(whole, allow_nan=False) + "\n", durable=True)
 
 
 def _digest(state: Any) -> str:
@@ -107,7 +114,7 @@ def opened(folder: Path, settings: Any, *, resume: bool) -> Generator[Archive]:
     with locked(folder):
         archive = Archive(folder)
         state = archive.state()
-        if state is None and (archive.cases or (folder / REPORT).exists()):
+        if state is None and (archive.cases or any((folder / name).exists() for name in (REPORT, JOURNAL))):
             raise InputError("holds files that are no search's", file=str(folder), expected="a new folder")
         if state is not None and not resume:
             raise InputError(

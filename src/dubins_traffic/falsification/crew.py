@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import pickle
-from collections.abc import Callable, Generator, Sequence
+from collections import Counter
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
+from dubins_traffic.campaign.chunks import fitting
 from dubins_traffic.campaign.engines import Engine
 from dubins_traffic.campaign.pool import Pool
 from dubins_traffic.campaign.ray_engine import RayEngine, check_address
@@ -16,13 +18,13 @@ from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError, WorkerLostError
 from dubins_traffic.falsification.remote import Remote
-from dubins_traffic.falsification.trying import Findings, Laboratory
+from dubins_traffic.falsification.trying import Laboratory, Tried, in_order
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 LOT: Final = 32
-"""Trials that a worker is handed at a time."""
+"""Most trials that a worker is handed at a time."""
 LOSSES: Final = 3
 """A lot whose worker ends so often is given up."""
 
@@ -41,8 +43,11 @@ class Crew(Protocol):
     make: Maker | Remote
     name: str
 
-    def run(self, instances: Sequence[Instance]) -> Findings:
-        """Run the trials of instances; what comes of them does not depend on who runs them."""
+    def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
+        """Run the trials of instances; yield what came of some, by their places in `instances`, as they end.
+
+        What comes of them does not depend on who runs them.
+        """
         ...
 
 
@@ -54,26 +59,27 @@ class Here:
         self.name = name
         self._laboratory = Laboratory(controller)
 
-    def run(self, instances: Sequence[Instance]) -> Findings:
-        """Run the trials of instances, in order."""
+    def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
+        """Run the trials of instances, and yield what came of some as soon as they have ended."""
         return self._laboratory.attempt(instances)
 
 
 @dataclass(frozen=True, slots=True)
 class Lot:
-    """Some trials of a search, for a worker."""
+    """Some trials of a search, for a worker; `first` is the place of the first among those that are run."""
 
     number: int
     controller: str
+    first: int
     instances: tuple[Instance, ...]
 
     def run(self, cancelled: Callable[[], bool]) -> bytes:
-        """Run the trials and return what came of them, pickled."""
+        """Run the trials; return what came of them, and how long their controller took for an answer, pickled."""
         if self.controller not in _laboratories:
             _laboratories[self.controller] = Laboratory(self.controller)
         laboratory = _laboratories[self.controller]
         laboratory.cancelled = cancelled
-        return pickle.dumps(laboratory.attempt(self.instances))
+        return pickle.dumps((in_order(laboratory.attempt(self.instances)), laboratory.answer_s or 0.0))
 
 
 _laboratories: dict[str, Laboratory] = {}
@@ -88,43 +94,45 @@ class Elsewhere:
         self.name = controller
         self._engine = engine
         self._number = 0
+        self._answer_s: float | None = None
 
-    def run(self, instances: Sequence[Instance]) -> Findings:
-        """Run the trials of instances, lots of them at a time."""
-        lots: list[Lot] = []
-        for first in range(0, len(instances), LOT):
-            lots.append(Lot(self._number, self.name, tuple(instances[first : first + LOT])))
-            self._number += 1
-        parts = self._done(lots)
-        whole = Findings([])
-        for lot in lots:
-            found: Findings = pickle.loads(parts[lot.number])
-            whole.tried += found.tried
-            whole.exercised += found.exercised
-        return whole
-
-    def _done(self, lots: Sequence[Lot]) -> dict[int, bytes]:
-        """Return what came of lots; one whose worker ends is run again, a few times."""
-        waiting, losses = list(reversed(lots)), dict.fromkeys([lot.number for lot in lots], 0)
-        parts: dict[int, bytes] = {}
+    def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
+        """Run the trials of instances, lots of them at a time; a lot whose worker ends is run again, a few times."""
+        lots, again, losses = self._lots(instances), list[Lot](), Counter[int]()
         under_way = 0
-        while len(parts) < len(lots):
-            while waiting and under_way < self._engine.capacity:
-                self._engine.submit(waiting.pop())
+        while True:
+            while under_way < self._engine.capacity:
+                lot = again.pop() if again else next(lots, None)
+                if lot is None:
+                    break
+                self._engine.submit(lot)
                 under_way += 1
+            if not under_way:
+                return
             for outcome in self._engine.wait():
                 under_way -= 1
                 lot = outcome.chunk
                 if outcome.part is not None:
-                    parts[lot.number] = outcome.part
+                    found: tuple[list[Tried], float] = pickle.loads(outcome.part)
+                    tried, self._answer_s = found
+                    yield dict(enumerate(tried, lot.first))
                     continue
                 losses[lot.number] += 1
                 if losses[lot.number] == LOSSES:
                     raise WorkerLostError(
                         f"workers end in the middle of trials: {self.name} may end its process"
                     )
-                waiting.append(lot)
-        return parts
+                again.append(lot)
+
+    def _lots(self, instances: Sequence[Instance]) -> Iterator[Lot]:
+        """Yield lots of the trials of instances, of what their controller does in about a second."""
+        first = 0
+        while first < len(instances):
+            rest = instances[first : first + LOT]
+            some = rest[: fitting(self._answer_s, max(own.ticks for own in rest), len(rest))]
+            yield Lot(self._number, self.name, first, tuple(some))
+            self._number += 1
+            first += len(some)
 
 
 def maker(controller: str | Maker) -> Maker:

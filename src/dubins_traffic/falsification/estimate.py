@@ -21,6 +21,7 @@ from dubins_traffic.falsification.liveness import TARGETS
 from dubins_traffic.falsification.replicas import Replicas, combined
 from dubins_traffic.falsification.sampling import STREAM, prepared
 from dubins_traffic.falsification.splitting import Begin, Split, split
+from dubins_traffic.falsification.trying import in_order
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many
 
@@ -176,7 +177,7 @@ def by_counting(
 
     def run() -> None:
         nonlocal happened, left_out
-        for number, tried in enumerate(crew.run(waiting).tried, counts.trials):
+        for number, tried in enumerate(in_order(crew.run(waiting)), counts.trials):
             met = not tried.discarded and tried.margins.get(event, np.inf) <= below
             happened += met
             left_out += tried.faulty and not met

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from dubins_traffic.falsification.cells import CELLS, DEGREES, MANOEUVRES, Cell, Manoeuvre
+from dubins_traffic.falsification.cells import DEGREES, MANOEUVRES, Cell, Manoeuvre
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.propositions import FLAG
@@ -90,14 +90,12 @@ class Passages:
         whole: list[int] = number.tolist()
         return [tuple(sorted(set(whole[a:b]))) for a, b in pairwise(ends)]
 
-    def exercised(self, crossing_degree: int, sound: Bools) -> Ints:
-        """Return how often each cell was put to the test, (`CELLS`,): what could have been broken there.
+    def exercised(self, trials: int, crossing_degree: int) -> list[tuple[int, ...]]:
+        """Return for each of `trials` trials which cells were put to the test: their numbers, each as often as it was.
 
-        Only trials that are `sound`, (K,), put anything to the test.
-
-        Rule 3 is put to the test by entering a crossing (a disc where `crossing_degree` roads meet, or more), its order
-        and clearance only if somebody was before the ego or in the crossing; rule 2 by something that stands in the
-        way; a collision needs somebody near.
+        A cell is put to the test where it could have been broken: rule 3 by entering a crossing (a disc where
+        `crossing_degree` roads meet, or more), its order and clearance only if somebody was before the ego or in the
+        crossing; rule 2 by something that stands in the way; a collision needs somebody near.
         """
         seen, came = self.flags, self.before
         met = _held(came, FLAG.AHEAD | BARRED)
@@ -113,12 +111,13 @@ class Passages:
             "3.clear": entered & _held(came, BARRED),
         }
         within = self.manoeuvre * DEGREES + self.degree
-        count = np.zeros(CELLS, dtype=np.int64)
-        counted = sound[self.trial]
-        for rule, happened in tested.items():
-            numbers = EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[happened & counted]
-            count += np.bincount(numbers, minlength=CELLS)
-        return count
+        numbers = [EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[own] for rule, own in tested.items()]
+        places = [self.trial[own] for own in tested.values()]
+        number, trial = np.concatenate(numbers), np.concatenate(places)
+        order = np.lexsort((number, trial))
+        ends: list[int] = np.searchsorted(trial[order], np.arange(trials + 1)).tolist()
+        whole: list[int] = number[order].tolist()
+        return [tuple(whole[a:b]) for a, b in pairwise(ends)]
 
 
 def find_passages(

@@ -6,8 +6,7 @@ import hashlib
 import json
 import os
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -24,6 +23,7 @@ from dubins_traffic.falsification.counts import Counts
 from dubins_traffic.falsification.coverage import Row, coverage, possible
 from dubins_traffic.falsification.coverage_page import coverage_page
 from dubins_traffic.falsification.crew import Crew, crew_of, name_of
+from dubins_traffic.falsification.found import Found
 from dubins_traffic.falsification.genome import Genome
 from dubins_traffic.falsification.judging import case_in
 from dubins_traffic.falsification.least import Least
@@ -31,7 +31,7 @@ from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.sampling import DURATION, Source, prepared
 from dubins_traffic.falsification.strategies import Strategy, make
 from dubins_traffic.falsification.targets import ASKED, check_targets, targets_of
-from dubins_traffic.falsification.trying import DONE, Findings, Tried
+from dubins_traffic.falsification.trying import DONE, Tried
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.scoring.verdict import EGO_RULES
@@ -47,40 +47,6 @@ SAVE: Final = 20.0
 """Seconds after which a search writes down where it goes on."""
 
 Progress = Callable[["Search"], object]
-
-
-@dataclass(frozen=True, slots=True)
-class Found:
-    """What a search leaves.
-
-    Attributes
-    ----------
-    folder : Path
-        Its folder.
-    cases : dict of str to Case
-        One case for each kind of failure, by the name of its cell.
-    trials, discarded, faulty, violated : int
-        How many trials it has run; of these, in how many the assumption was broken first, how many ended by a fault,
-        and in how many the ego broke a rule that was asked for.
-    coverage : list of Row
-        Which rule, manoeuvre and crossing were put to the test.
-    fault : str
-        How many trials ended by which fault, and why the first; empty if none did.
-    """
-
-    folder: Path
-    cases: Mapping[str, Case]
-    trials: int
-    discarded: int
-    faulty: int
-    violated: int
-    coverage: list[Row]
-    fault: str = ""
-
-    @property
-    def page(self) -> Path:
-        """The page with the coverage and what was found."""
-        return self.folder / archives.PAGE
 
 
 class Search:
@@ -100,9 +66,13 @@ class Search:
         The rules, and formulas, that are asked for.
     crew : Crew
         Who runs the trials.
+    progress : callable, optional
+        Is told of it whenever trials are finished.
 
     Attributes
     ----------
+    finished : int
+        How many trials are finished: those that are counted, and of the generation under way those that are kept.
     found_in : dict of str to int
         For each case, by the name of its cell, the number of the trial in which it was found, from 0.
     """
@@ -115,16 +85,18 @@ class Search:
         strategy: Strategy,
         targets: Sequence[str],
         crew: Crew,
+        progress: Progress | None = None,
     ) -> None:
         self.archive, self.counts = archive, Counts()
         self._settings, self._source, self._strategy = settings, source, strategy
-        self._targets, self._crew = tuple(targets), crew
+        self._targets, self._crew, self._progress = tuple(targets), crew, progress
         self._expected: set[int] = set()
         self.found_in: dict[str, int] = {}
         self._least = Least()
         state = archive.state()
         if state is not None:
             self._restore(state)
+        self.finished = self.counts.trials
 
     def generation(self, most: int) -> None:
         """Try the next trials, at most `most`; whatever interrupts it, they are taken over whole or not at all."""
@@ -133,26 +105,49 @@ class Search:
         numbers = range(first, first + min(size, most))
         genomes = self._strategy.propose(numbers)
         instances = self._source.build(genomes)
-        findings = self._crew.run(instances)
-        fresh, unconfirmed = self._judged(numbers, instances, findings.tried)
+        tried = self._tried(numbers, genomes, instances)
+        fresh, unconfirmed = self._judged(numbers, instances, tried)
         with WHOLE:
-            self._take_all(numbers, genomes, instances, findings)
+            self._take_all(numbers, genomes, instances, tried)
             self.counts.unconfirmed += unconfirmed
             for cell, (number, case) in fresh.items():
                 self.archive.keep(cell, case)
                 self.found_in[cell] = number
+            self.archive.journal.taken()
+        self._tell()
+
+    def _tell(self) -> None:
+        if self._progress is not None:
+            self._progress(self)
+
+    def _tried(self, numbers: range, genomes: Sequence[Genome], instances: Sequence[Instance]) -> list[Tried]:
+        """Return what comes of trials; those that are in the journal are not run again, the others go there."""
+        journal = self.archive.journal
+        count = len(numbers)
+        known = map(journal.known, numbers, genomes)
+        found = {k: own for k, own in enumerate(known) if own is not None}
+        left = [k for k in range(count) if k not in found]
+        self.finished = self.counts.trials + len(found)
+        for part in self._crew.run([instances[k] for k in left]):
+            with WHOLE:
+                came = {left[k]: own for k, own in part.items()}
+                journal.keep((numbers[k], genomes[k], own) for k, own in came.items())
+                found |= came
+                self.finished += len(part)
+            if len(found) < count:
+                self._tell()
+        return [found[k] for k in range(count)]
 
     def _take_all(
-        self, numbers: range, genomes: Sequence[Genome], instances: Sequence[Instance], findings: Findings
+        self, numbers: range, genomes: Sequence[Genome], instances: Sequence[Instance], tried: Sequence[Tried]
     ) -> None:
         """Count the trials of a generation, and tell the strategy of them."""
         places = {id(own.problem.network): own for own in instances}
         self._expected.update(cell.number for cell in possible(places.values()))
-        for number, genome, tried in zip(numbers, genomes, findings.tried, strict=True):
-            self._least.take(number, genome, tried)
-            self.counts.take_fault(number, tried.fault)
-            self._strategy.tell(number, genome, tried, self._count(tried))
-        self.counts.exercised += findings.exercised
+        for number, genome, own in zip(numbers, genomes, tried, strict=True):
+            self._least.take(number, genome, own)
+            self.counts.take_fault(number, own.fault)
+            self._strategy.tell(number, genome, own, self._count(own))
         self.counts.trials += len(numbers)
 
     def _count(self, tried: Tried) -> bool:
@@ -160,6 +155,7 @@ class Search:
         counts, wanted = self.counts, self._wanted(tried)
         counts.discarded += tried.discarded
         counts.violated += bool(wanted)
+        np.add.at(counts.exercised, np.array(tried.exercised, dtype=np.int64), 1)
         for cell in wanted:
             if cell.number >= 0:
                 counts.broken[cell.number] += 1
@@ -227,6 +223,7 @@ class Search:
             "least": self._least.state() if DONE in self._targets else [],
         }
         self.archive.remember(state)
+        self.archive.journal.settle(self.counts.trials)
 
     def _restore(self, state: Any) -> None:
         self.counts = Counts(**state["counts"])
@@ -296,14 +293,15 @@ def falsify(
     resume : bool
         Whether to go on with what has been begun in `folder`.
     progress : callable, optional
-        Is told after every generation of the search how far it is.
+        Is told whenever trials are finished: of a slow controller's one by one (`Search.finished`).
+
 
     Raises
     ------
     InputError
         If anything of this is wrong, or the folder holds something else.
     KeyboardInterrupt
-        On Ctrl-C; what has been found is kept.
+        On Ctrl-C; what has been found is kept, and no trial that is finished is run again by `resume`.
     """
     if seconds is not None and not seconds >= 0.0:
         raise InputError("not a time", file="--seconds", value=seconds, expected="a number >= 0")
@@ -325,20 +323,18 @@ def falsify(
         crew_of(controller, name, workers, ray) as crew,
         heard_between_frames(),
     ):
-        search = Search(archive, settings, source, proposing, targets, crew)
+        search = Search(archive, settings, source, proposing, targets, crew, progress)
         if archive.state() is None:
             search.save()
         try:
-            for _ in _generations(search, trials, seconds):
-                if progress is not None:
-                    progress(search)
+            _run(search, trials, seconds)
         finally:
             search.save()
         return search.result()
 
 
-def _generations(search: Search, trials: int | None, seconds: float | None) -> Iterator[int]:
-    """Run generations until there have been enough; yield after each how many trials there have been."""
+def _run(search: Search, trials: int | None, seconds: float | None) -> None:
+    """Run generations until there have been enough trials, or time is up."""
     began = saved = time.monotonic()
     while (trials is None or search.counts.trials < trials) and (
         seconds is None or time.monotonic() - began < seconds
@@ -347,4 +343,3 @@ def _generations(search: Search, trials: int | None, seconds: float | None) -> I
         if time.monotonic() - saved > SAVE:
             search.save()
             saved = time.monotonic()
-        yield search.counts.trials

@@ -15,7 +15,7 @@ from dubins_traffic.falsification.judging import Judged, Make, confirm, judge
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.removals import WAYS, Removal, Way, lead, removals
 from dubins_traffic.falsification.sentences import sentence_of
-from dubins_traffic.falsification.trying import Laboratory
+from dubins_traffic.falsification.trying import Laboratory, in_order
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 
 if TYPE_CHECKING:
@@ -116,8 +116,8 @@ class _Shrinker:
         tried = [(what, own) for what, own in way(record.instance, record.frames) if _is_sound(own)]
         if not tried:
             return None
-        findings = self._laboratory.attempt([own for _, own in tried])
-        for (what, own), came in zip(tried, findings.tried, strict=True):
+        findings = in_order(self._laboratory.attempt([own for _, own in tried]))
+        for (what, own), came in zip(tried, findings, strict=True):
             if any(cell.rule == self._rule for cell, _ in came.cells):
                 again = confirm(own, self._rule, self._make, self._name)
                 if again is not None and self._keeps_lead(again, found):

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from dubins_traffic.campaign.chunks import fitting
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.controllers import named
 from dubins_traffic.controllers import registry as controllers
@@ -17,11 +18,10 @@ from dubins_traffic.engine.controlled import BatchController, Controlled, Maker,
 from dubins_traffic.engine.group import Group
 from dubins_traffic.engine.lanes_together import LanesTogether
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
-from dubins_traffic.falsification.cells import CELLS, Cell
+from dubins_traffic.falsification.cells import Cell, Manoeuvre
 from dubins_traffic.falsification.liveness import spare
 from dubins_traffic.falsification.passages import Passages, find_passages
 from dubins_traffic.falsification.remote import Remote
-from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.reader import Record, replay
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.rules.parameters import RuleParameters
@@ -69,6 +69,9 @@ class Tried:
         What it met with (`passages.Passages.situations`); empty where nobody asks for it.
     fault : str
         The end of a faulty trial and the reason, ``END: REASON``.
+    exercised : tuple of int
+        The numbers of the cells that it put to the test, each as often as it did; none if it ended by a fault, or
+        where nobody asks for it.
     """
 
     discarded: bool
@@ -77,16 +80,23 @@ class Tried:
     cells: tuple[tuple[Cell, int], ...]
     situations: tuple[int, ...] = ()
     fault: str = ""
+    exercised: tuple[int, ...] = ()
 
+    def to_json(self) -> dict[str, Any]:
+        """Return it as a JSON object, from which `from_json` makes an equal one."""
+        cells = [[cell.rule, cell.manoeuvre, cell.degree, tick] for cell, tick in self.cells]
+        return {name: getattr(self, name) for name in self.__slots__} | {"cells": cells}
 
-@dataclass(slots=True)
-class Findings:
-    """What came of some trials, in their order, and how often those that did not end by a fault put each cell to the
-    test, (CELLS,).
-    """
-
-    tried: list[Tried]
-    exercised: Ints = field(default_factory=lambda: np.zeros(CELLS, dtype=np.int64))
+    @staticmethod
+    def from_json(document: Mapping[str, Any]) -> Tried:
+        """Return what the JSON object says."""
+        cells = tuple(
+            (Cell(rule, Manoeuvre(manoeuvre), degree), tick)
+            for rule, manoeuvre, degree, tick in document["cells"]
+        )
+        numbers = {name: tuple(document[name]) for name in ("situations", "exercised")}
+        own: dict[str, Any] = {**document, "cells": cells, **numbers}
+        return Tried(**own)
 
 
 class Laboratory:
@@ -99,6 +109,11 @@ class Laboratory:
     cancelled : callable
         Is asked now and then whether to stop.
 
+    Attributes
+    ----------
+    answer_s : float or None
+        How long the controller took for an answer in the last trials in which it was asked, seconds; None before.
+
     Raises
     ------
     InputError
@@ -108,7 +123,8 @@ class Laboratory:
     def __init__(self, controller: str | Maker | Remote, cancelled: Cancelled = lambda: False) -> None:
         self._name = controller if isinstance(controller, str) else "controller"
         self.cancelled = cancelled
-        self._asked, self._fit = 0, fitness()
+        self.answer_s: float | None = None
+        self._number, self._fit = 0, fitness()
         self._remote = controller if isinstance(controller, Remote) else None
         self._overtakes: Overtakes | None
         self._lanes, self._overtakes = lanes_of(self._name)
@@ -119,32 +135,47 @@ class Laboratory:
         self._shared = made if isinstance(made, BatchController) else None
         self._most = BOXES if named.SANDBOX.search(self._name) else MOST
 
-    def attempt(self, instances: Sequence[Instance]) -> Findings:
-        """Run the trials of instances.
+    def attempt(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
+        """Run the trials of instances; yield what came of some, by their places in `instances`, as they end.
+
+        What runs without asking anybody in Python runs together, and so does what one controller drives; else no more
+        trials than `fitting` says.
 
         Raises
         ------
         KeyboardInterrupt
             When it is cancelled.
         """
-        found: dict[int, Tried] = {}
-        whole = Findings([])
+        places = {id(own): k for k, own in enumerate(instances)}
         together = [own for own in instances if self._remote is None and can_share(own)]
         known = self._name == COMPILED or self._lanes
         compiled = [own for own in together if known and self._fit(own) and undisturbed(own)]
         fast = set(map(id, compiled))
         for own in grouped(compiled):
-            self._take(self._finished(own), range(len(own)), found, whole)
+            yield self._taken(self._finished(own), places)
         for own in grouped([own for own in together if id(own) not in fast]):
-            for first in range(0, len(own), self._most):
-                self._ask(own[first : first + self._most], found, whole)
+            first = 0
+            while first < len(own):
+                some = own[first : first + self._count(own[first:])]
+                yield self._taken(self._steered(some), places)
+                first += len(some)
         shared = set(map(id, together))
         for own in instances:
             if id(own) not in shared:
                 self._check()
-                found[id(own)] = self._alone(own, whole)
-        whole.tried = [found[id(own)] for own in instances]
-        return whole
+                yield {places[id(own)]: self._alone(own)}
+
+    def _count(self, instances: Sequence[Instance]) -> int:
+        """Return how many of some trials whose controllers are asked in every tick run together."""
+        most = min(self._most, len(instances))
+        if self._shared is not None:
+            return most
+        return fitting(self.answer_s, max(own.ticks for own in instances), most)
+
+    def _note(self, summaries: Iterable[Mapping[str, float]]) -> None:
+        """Note how long the controller took for an answer in trials, by the summaries of their latencies."""
+        means = [own["mean"] for own in summaries if own]
+        self.answer_s = sum(means) / len(means) if means else 0.0
 
     def _check(self) -> None:
         if self.cancelled():
@@ -163,57 +194,48 @@ class Laboratory:
         self._check()
         return group
 
-    def _ask(self, instances: Sequence[Instance], found: dict[int, Tried], whole: Findings) -> None:
-        """Run trials whose controllers are asked in every tick."""
+    def _steered(self, instances: Sequence[Instance]) -> Group:
+        """Return trials that have been run, whose controllers were asked in every tick."""
         shared = self._shared
         if shared is not None:
             check_clear(instances)
-        numbers = range(self._asked, self._asked + len(instances))
-        self._asked = numbers.stop
+        numbers = range(self._number, self._number + len(instances))
+        self._number = numbers.stop
         seats = Controlled(instances, self._make, shared, numbers=numbers)
+        latencies: list[Mapping[str, float]] = []
         while len(seats.group.active):
             self._check()
             if shared is None:
                 seats.ask_each()
             else:
                 ask_all([seats], shared)
-            for _ in seats.step(self._name):
-                continue
-        self._take(seats.group, range(len(instances)), found, whole)
+            latencies += [outcome.act_s for outcome in seats.step(self._name)]
+        self._note(latencies)
+        return seats.group
 
-    def _take(self, group: Group, trials: Sequence[int], found: dict[int, Tried], whole: Findings) -> None:
-        """Take over what came of a group whose trials have all ended."""
+    def _taken(self, group: Group, places: Mapping[int, int]) -> dict[int, Tried]:
+        """Return what came of a group whose trials have all ended, by the places of their instances."""
         ego = group.world.tally.ego
-        outcomes = group.outcomes(trials, self._name)
+        outcomes = group.outcomes(range(len(group.instances)), self._name)
         frames = np.array([outcome.ending.ticks + 1 for outcome in outcomes])
         networks = [own.problem.network for own in group.instances]
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
-        sound = np.array([outcome.ending.end not in FAULTS for outcome in outcomes])
-        whole.exercised += passages.exercised(_crossing_degree(group.instances[0]), sound)
         rate = group.instances[0].problem.rate
-        situations = passages.situations(len(outcomes))
-        for b, outcome in enumerate(outcomes):
-            tried = tried_of(outcome.score, outcome.ending, passages, b, rate)
-            found[id(outcome.instance)] = replace(tried, situations=situations[b])
+        tried = [tried_of(own.score, own.ending, passages, b, rate) for b, own in enumerate(outcomes)]
+        whole = with_passages(tried, passages, group.instances[0])
+        return {places[id(own.instance)]: came for own, came in zip(outcomes, whole, strict=True)}
 
-    def _alone(self, instance: Instance, whole: Findings) -> Tried:
+    def _alone(self, instance: Instance) -> Tried:
         """Run a trial that can't be stepped with others."""
         if self._remote is not None:
             record = self._remote.drive(instance)
             found, passages = judged_record(record)
-            return self._tried(instance, found, record.ending, passages, whole)
+            return _tried_alone(instance, found, record.ending, passages)
         ego = EgoTrace()
         driver = controllers.made(self._make)
         result = run_trial(instance, driver, sinks=[ego], name=self._name, sketch=False)
-        return self._tried(instance, result.score, result.ending, ego.passages(), whole)
-
-    def _tried(
-        self, instance: Instance, found: Score, ending: Ending | None, passages: Passages, whole: Findings
-    ) -> Tried:
-        """Take over what came of a trial that was run alone."""
-        tried = tried_of(found, ending, passages, 0, instance.problem.rate)
-        whole.exercised += passages.exercised(_crossing_degree(instance), np.array([not tried.faulty]))
-        return replace(tried, situations=passages.situations(1)[0])
+        self._note([result.wall.act_s])
+        return _tried_alone(instance, result.score, result.ending, ego.passages())
 
 
 class EgoTrace:
@@ -273,6 +295,31 @@ def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int
     return Tried(discarded, bool(fault), margins, cells, fault=fault)
 
 
+def _tried_alone(instance: Instance, found: Score, ending: Ending | None, passages: Passages) -> Tried:
+    """Return what came of a trial that was run alone."""
+    tried = tried_of(found, ending, passages, 0, instance.problem.rate)
+    return with_passages([tried], passages, instance)[0]
+
+
+def with_passages(tried: Sequence[Tried], passages: Passages, instance: Instance) -> list[Tried]:
+    """Return trials with what they met with and put to the test; they are in the order of `passages`.
+
+    `instance` is that of one of them; its rules are those of all.
+    """
+    degree = RuleParameters.from_mapping(instance.problem.rules).crossing_degree
+    met, tested = passages.situations(len(tried)), passages.exercised(len(tried), degree)
+    return [
+        replace(own, situations=met[b], exercised=() if own.faulty else tested[b])
+        for b, own in enumerate(tried)
+    ]
+
+
+def in_order(parts: Iterable[Mapping[int, Tried]]) -> list[Tried]:
+    """Return what came of trials in the order of their instances, of which `parts` have some each."""
+    found = {k: own for part in parts for k, own in part.items()}
+    return [found[k] for k in range(len(found))]
+
+
 def lanes_of(name: str) -> tuple[bool, Overtakes | None]:
     """Tell whether a name is that of `lanes`, and when its shield overtakes; None without a shield."""
     bare, overtakes = controllers.shield_of(name) or (name, None)
@@ -283,7 +330,3 @@ def broken_formulas(score: Score) -> dict[str, float]:
     """Return the seconds at which the problem's own formulas became false, by what a search calls them."""
     false = [own for own in score.formulas if own.verdict == "false"]
     return {f"{FORMULA} {own.name}": own.time for own in false if own.time is not None}
-
-
-def _crossing_degree(instance: Instance) -> int:
-    return RuleParameters.from_mapping(instance.problem.rules).crossing_degree
