@@ -260,6 +260,7 @@ def test_a_search_names_the_fault_and_tests_nothing_by_it(
     who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["falsify", "junction", "--controller", f"own.py:{who}", "-o", "out"]
+    Path("out").mkdir()  # what is gone on with must be there
     for trials in ("32", "64"):
         assert main([*arguments, "--trials", trials, "--resume"]) == 1
         out, err = capsys.readouterr()
