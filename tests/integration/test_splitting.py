@@ -29,9 +29,7 @@ EVENTS = [
 
 
 @pytest.mark.parametrize(("own", "below", "truth"), EVENTS)
-def test_the_intervals_of_splitting_hold_what_was_counted(
-    own: Traffic, below: float, truth: float
-) -> None:
+def test_the_intervals_of_splitting_hold_what_was_counted(own: Traffic, below: float, truth: float) -> None:
     assert 1e-4 <= truth <= 1e-2
     count, bar = (100, 90) if FULL else (4, 3)
     held = 0
