@@ -241,7 +241,10 @@ def test_a_log_becomes_the_records_of_its_trials(tmp_path: Path) -> None:
     assert there.instance.problem == here.instance.problem
     (tmp_path / "cut.log").write_bytes(log.read_bytes()[:200])
     done = subprocess.run(
-        [COMMAND, "convert", tmp_path / "cut.log", "-o", first], check=False, capture_output=True, text=True
+        [COMMAND, "convert", tmp_path / "cut.log", "-o", tmp_path / "cut.mcap"],
+        check=False,
+        capture_output=True,
+        text=True,
     )
     assert done.returncode == 2
     assert "cut.log" in done.stderr

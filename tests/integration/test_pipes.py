@@ -32,6 +32,8 @@ CONFIG: dict[str, Any] = {
     "number_trials": 2,
 }
 
+GOALS_ALONE = "no rules of the road are in it, so the task is its goals alone (`instance --full` keeps rules)"
+
 
 @pytest.fixture(autouse=True)
 def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
@@ -232,7 +234,7 @@ def test_commands_say_what_they_have_written(capsys):
     cases: list[tuple[list[str], str]] = [
         (["network", "-o", "n.json"], "n.json"),
         (["instance", "small.json", "-o", "i.json"], "i.json"),
-        (["spec", "i.json", "-o", "s.txt"], "s.txt"),
+        (["spec", "i.json", "-o", "s.txt"], f"dubins-traffic: i.json: {GOALS_ALONE}\ns.txt"),
         (["convert", "n.json", "-o", "n.rnd"], "n.rnd"),
         (["convert", "x.mcap", "-o", "x.csv"], "x.csv"),
         (["replay", "x.mcap"], "x.html"),

@@ -112,6 +112,7 @@ def test_the_numbers_of_the_page_are_those_of_the_file(ran: Path) -> None:
     file = json.loads(ran.read_text())
     lines = {line.split(" | ")[0].removeprefix("| "): line.split(" | ") for line in made[TABLE].splitlines()}
     page = made["index.html"]
+    assert "| time to act, mean, wall clock, ms |" in made[TABLE]
     for entry in file["entries"]:
         columns = entry["columns"]
         mean = estimate(_floats(columns["counted_rounds"]))
