@@ -170,8 +170,8 @@ class RecordWriter:
         try:
             yield
         except FileExistsError as error:
-            expected = "a new name; --overwrite replaces it"
-            raise InputError("the file exists", file=str(self.path), expected=expected) from error
+            expected = "a new name, or --overwrite"
+            raise InputError("exists already", file=str(self.path), expected=expected) from error
         except OSError as error:
             raise InputError(f"can't be written: {error.strerror}", file=str(self.path)) from error
 
