@@ -156,7 +156,7 @@ def test_the_numbers_of_the_results_are_those_of_the_files(site: Path) -> None:
             assert cells[1].startswith(f"{sum(values) / len(values):.4g}")
             if name == "rules-2026":
                 clean = share(sum(columns["clean"]), len(values))
-                assert cells[3].startswith(f"{clean.share:.1%} [")
+                assert cells[4].startswith(f"{clean.share:.1%} [")
         if suite.model.games:
             assert {line[-2] for line in rows.values()} == {"right"}
 
