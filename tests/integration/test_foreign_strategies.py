@@ -336,5 +336,5 @@ def test_the_command_writes_specifications(tmp_path: Path, capsys: pytest.Captur
         assert "car1_0" in target.read_text()
     assert main(["synth", str(file), "--spec", str(tmp_path / "game.tlsf")]) == 2
     assert main(["synth", str(file), "--spec", str(tmp_path / "game.txt")]) == 2
-    assert "not a file of a specification" in capsys.readouterr().err
+    assert "not a name of a specification" in capsys.readouterr().err
     assert not (tmp_path / "game.txt").exists()
