@@ -20,22 +20,22 @@ log=$scratch/log
 
 fetch() {
   local own=(-o "Dir::State::Lists=$scratch/lists" -o "Dir::Cache=$scratch/cache" -o APT::Sandbox::User=root) name
-  mkdir -p "$scratch/lists/partial" "$scratch/cache/archives/partial" "$scratch/root"
+  mkdir -p "$scratch/lists/partial" "$scratch/cache/archives/partial" "$scratch/tree"
   apt-get "${own[@]}" -o Acquire::Retries=3 update
   name=$(apt-cache "${own[@]}" depends "$image" | awk '$1 == "Depends:" && !n++ { print $2 }')
   [ -n "$name" ] || { echo "there is no package $image" && return 1; }
   (cd "$scratch" && apt-get "${own[@]}" -o Acquire::Retries=3 download "$name" busybox-static)
-  for package in "$scratch"/*.deb; do dpkg-deb -x "$package" "$scratch/root"; done
+  for package in "$scratch"/*.deb; do dpkg-deb -x "$package" "$scratch/tree"; done
 }
 
 pack() {
-  local busybox=$scratch/root/bin/busybox inside=$scratch/inside name found
-  [ -x "$busybox" ] || busybox=$scratch/root/usr/bin/busybox
+  local busybox=$scratch/tree/bin/busybox inside=$scratch/inside name found
+  [ -x "$busybox" ] || busybox=$scratch/tree/usr/bin/busybox
   mkdir -p "$inside/new" "$scratch/kernel"
   cp "$busybox" "$inside/busybox"
   echo '#!/busybox sh' >"$inside/init"
   for name in $modules; do
-    found=$(find "$scratch/root" -name "$name.ko*" | head -n 1)
+    found=$(find "$scratch/tree" -name "$name.ko*" | head -n 1)
     [ -n "$found" ] || continue
     cp "$found" "$inside/"
     [[ $found != *.xz ]] || "$busybox" unxz "$inside/$name.ko.xz"
@@ -48,7 +48,7 @@ exec /busybox switch_root /new "$script"
 END
   chmod 755 "$inside/init"
   (cd "$inside" && find . | "$busybox" cpio -o -H newc) >"$scratch/kernel/initrd"
-  cp "$scratch"/root/boot/vmlinuz-* "$scratch/kernel/vmlinuz"
+  cp "$scratch"/tree/boot/vmlinuz-* "$scratch/kernel/vmlinuz"
   mkdir -p build
   rm -rf "$folder"
   mv "$scratch/kernel" "$folder"
