@@ -175,7 +175,7 @@ def test_commands_tell_and_store_how_much_the_strategy_decided(
             document["entries"][0]["columns"]["strategy_share"] = [wrong]
             file.write_text(json.dumps(document))
             assert main(compare) == 2
-            assert f"columns.strategy_share: not a share: got {wrong}" in capsys.readouterr().err
+            assert f"columns.strategy_share: not a share: got {wrong!r}" in capsys.readouterr().err
 
 
 def swapped(text: str) -> str:

@@ -431,13 +431,13 @@ def test_check_prints_the_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert main(["check", str(judged), str(silent), "--json"]) == 0
     first, second = json.loads(capsys.readouterr().out)["records"]
     keys = [
-        "record", "clean", "verdict", "near", "violations", "rounds", "counted_rounds", "longest_gap_s",
+        "record", "end", "clean", "verdict", "near", "violations", "rounds", "counted_rounds", "longest_gap_s",
     ]  # fmt: skip
     assert list(first) == keys
     assert (first["record"], first["clean"]) == (str(judged), False)
     assert first["verdict"] in ("violated", "excused")
     assert list(first["violations"][0]) == ["rule", "car", "time", "since", "where"]
-    assert [second[key] for key in keys[1:5]] == [None, None, None, []]
+    assert [second[key] for key in keys[2:6]] == [None, None, None, []]
     assert main(["check", str(judged), str(silent)]) == 0
     text = capsys.readouterr().out
     assert first["verdict"] in text
