@@ -5,9 +5,12 @@ from __future__ import annotations
 import re
 import subprocess
 import sys
+from importlib.metadata import distributions
 from pathlib import Path
 
 import pytest
+from packaging.specifiers import SpecifierSet
+from packaging.utils import canonicalize_name
 
 from tests import guest
 from tests.architecture.house import ROOT
@@ -19,6 +22,10 @@ OF_A_MODEL = re.compile(
 )
 """What starts user-mode Linux, whose frame is too small for the registers of some models, or asks for the model."""
 WRITTEN = {".py", ".sh", ".md", ".toml", ".yml", ".cpp", ".c", ".hpp", ""}
+
+
+OF_DEBIAN_12 = "3.11.2"
+"""The Python of Debian 12."""
 
 
 def written() -> list[Path]:
@@ -48,3 +55,15 @@ def test_programs_that_tests_start_hear_ctrl_c_wherever_the_tests_were_begun() -
 
 def test_every_test_has_a_limit_at_which_it_is_ended(pytestconfig: pytest.Config) -> None:
     assert 0 < float(pytestconfig.getini("timeout")) <= 3600
+
+
+def test_all_that_is_pinned_installs_with_the_python_of_debian_12() -> None:
+    lines = (ROOT / "constraints.txt").read_text().splitlines()
+    pinned = {canonicalize_name(line.partition("==")[0]) for line in lines if "==" in line}
+    found = {
+        own.name: own.metadata.get("Requires-Python") or ""
+        for own in distributions()
+        if canonicalize_name(own.name) in pinned
+    }
+    assert len(found) > 100
+    assert not {name for name, asked in found.items() if not SpecifierSet(asked).contains(OF_DEBIAN_12)}

@@ -35,6 +35,16 @@ def test_where_most_runs_die_out_the_interval_reaches_around_that_of_the_first_t
     assert found.better == "monte-carlo"
 
 
+def test_equal_estimates_make_no_narrow_interval() -> None:
+    """Estimates lie on a grid, so few of them are often equal; their spread of 0 says nothing."""
+    found = _runs((0.08, 8), (0.08, 9))
+    low, high = clopper_pearson(17, 200)
+    assert found.interval == (low, high)
+    assert low < 0.06
+    assert high > 0.12
+    assert found.better == "monte-carlo"
+
+
 def test_runs_that_agree_are_worth_more_trials_than_they_took() -> None:
     found = _runs(*[(value, 0) for value in (0.001, 0.0011, 0.0009, 0.001, 0.001)])
     assert found.interval[0] > 0.0009

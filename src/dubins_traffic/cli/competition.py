@@ -193,7 +193,9 @@ def _key(phase: Phase, key_file: str | None, *, confirm: bool = False) -> bytes:
     try:
         os.close(os.open("/dev/tty", os.O_RDWR))  # where a passphrase is asked for
         text: str = typer.prompt("Passphrase", hide_input=True, confirmation_prompt=confirm, err=True)
-    except (OSError, typer.Abort):
+    except (OSError, typer.Abort) as end:
+        if isinstance(end.__context__, KeyboardInterrupt):
+            raise KeyboardInterrupt from None
         raise InputError(
             "no passphrase was typed, nor is a key file named",
             file="--key-file",

@@ -34,7 +34,7 @@ def instance(
     from dubins_traffic.problem.draw import draw
     from dubins_traffic.problem.files import DOCUMENTS, dumps
 
-    options.require(output, "an instance", DOCUMENTS, overwrite=overwrite, apart_from=[config])
+    options.require(output, "an instance", DOCUMENTS, overwrite=overwrite, apart_from=[config], standard=True)
     configuration = load_config(config)
     maps.report(configuration.network)
     drawn = draw(configuration, seed, trial)

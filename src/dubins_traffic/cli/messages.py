@@ -31,6 +31,6 @@ def lcm(output: options.Output = None, overwrite: options.Replace = False) -> No
     """Print the definitions of the messages, from which lcm-gen makes code for C, C++, Java, Lua, Go, ..."""
     from importlib.resources import files
 
-    options.require(output, "definitions", (".lcm",), overwrite=overwrite)
+    options.require(output, "definitions", (".lcm",), overwrite=overwrite, standard=True)
     definitions = files("dubins_traffic.transports.lcm") / "dubins_traffic_lcm.lcm"
     options.write(definitions.read_text(encoding="utf-8"), output)

@@ -102,7 +102,9 @@ def network(
     from dubins_traffic.roads.network import RoadNetwork
 
     suffixes = packed(*SUFFIXES[format])
-    options.require(output, "a road network", suffixes, overwrite=overwrite, apart_from=[source])
+    options.require(
+        output, "a road network", suffixes, overwrite=overwrite, apart_from=[source], standard=True
+    )
     if source is None:
         maps.require_no_scale(None, scale, w)
     if source is not None:

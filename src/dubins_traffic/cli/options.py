@@ -204,9 +204,10 @@ def require(
     *,
     overwrite: bool,
     apart_from: Sequence[str | None] = (),
+    standard: bool = False,
 ) -> None:
-    """Refuse an output as `files.require_output` does; standard output never is."""
-    if output is None or output == "-":
+    """Refuse an output as `files.require_output` does; ``-`` is none but where `standard` output is one."""
+    if output is None or (standard and output == "-"):
         return
     from dubins_traffic.files import require_output
 

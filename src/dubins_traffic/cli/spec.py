@@ -84,7 +84,9 @@ def spec(
     if period is not None and not 0.0 < period < math.inf:
         raise InputError("not a period", field="--period", value=period, expected="seconds > 0")
     suffixes = PLAIN if format is None else SUFFIXES.get(format, PLAIN)
-    options.require(output, "a specification", suffixes, overwrite=overwrite, apart_from=[instance])
+    options.require(
+        output, "a specification", suffixes, overwrite=overwrite, apart_from=[instance], standard=True
+    )
     found = _instance(instance)
     try:
         whole = task(found.problem, found.names)

@@ -63,11 +63,13 @@ def combined(runs: Sequence[Split], particles: int) -> Replicas:
     trials, branches = sum(run.trials for run in runs), sum(run.branches for run in runs)
     extinct = sum(value == 0.0 for value in found)
     counted = clopper_pearson(sum(run.counted for run in runs), len(runs) * particles)
-    interval = counted if branches == 0 or mean == 0.0 else korn_graubard(found)
-    if 2 * extinct > len(runs):
+    # Equal estimates show no spread, which says nothing of it: then Monte Carlo's trials have the word.
+    flat = len(set(found)) == 1
+    interval = counted if branches == 0 or mean == 0.0 else (mean, mean) if flat else korn_graubard(found)
+    if 2 * extinct > len(runs) or flat:
         interval = min(interval[0], counted[0]), max(interval[1], counted[1])
     repeated = sum(run.repeated for run in runs) / branches if branches else 0.0
-    equal = trials if branches == 0 else worth(found) if mean > 0.0 else None
+    equal = trials if branches == 0 or (flat and mean > 0.0) else worth(found) if mean > 0.0 else None
     lost = equal is None or equal <= trials or 2 * extinct > len(runs)
     better = MONTE_CARLO if lost else SPLITTING
     told = Replicas(mean, interval, trials, extinct, repeated, equal, better)

@@ -108,6 +108,7 @@ class Processes:
         """Tell whether they have been stopped, or are to be stopped, for the memory that they use."""
         if self._group is not None and MEMORY in self._layers:
             return self._group.out_of_memory()
+        self._clocks.seconds()  # looks at the processes, also where a group's clock counts their time
         return self._clocks.memory + self._clocks.buffers() > self._limits.memory
 
     def files(self) -> int:

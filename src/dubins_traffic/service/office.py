@@ -133,6 +133,12 @@ def _moment(at: float | None) -> datetime | None:
 
 def _key(path: Path, folder: Path) -> bytes:
     if not path.exists():
+        if any((folder / "competitions").glob("*/")):  # a new key would read nothing of what they hold
+            raise InputError(
+                "no such key, and the folder has competitions",
+                file=str(path),
+                expected="the key with which they were made (--key-file)",
+            )
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         keys.make_key_file(path, folder)
     return keys.read_key(path, folder)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
+import structlog
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
@@ -12,9 +13,11 @@ from dubins_traffic.competition.competition import Phase as Loaded
 from dubins_traffic.competition.judging import Judged
 from dubins_traffic.competition.ranking import missing, rank
 from dubins_traffic.service import submissions
-from dubins_traffic.service.hiding import Hiding
+from dubins_traffic.service.hiding import HiddenError, Hiding
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Phase, Standing, Submission, Team, Trial
+
+log = structlog.get_logger("dubins_traffic.service")
 
 ANSWERS_A_DAY = 24
 """So often a day at most a table of rounded aggregates is made anew."""
@@ -47,7 +50,10 @@ def refresh(office: Office) -> None:
             select(Phase.id).where((Phase.version > Phase.ranked) | Phase.id.in_(scoring))
         ).all()
     for number in due:
-        _rank_phase(office, number)
+        try:
+            _rank_phase(office, number)
+        except HiddenError as error:  # the other phases do not wait for one that can't be read
+            log.error("a phase can't be ranked", phase=number, error=str(error))
 
 
 def _rank_phase(office: Office, number: int) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dubins_traffic.campaign import rows
-from dubins_traffic.campaign.report.comparison import Comparison
+from dubins_traffic.campaign.report.comparison import Comparison, Standing
 from dubins_traffic.campaign.report.metrics import WALL_METRICS, shown
 from dubins_traffic.campaign.report.statistics import Estimate, Share
 from dubins_traffic.scoring.columns import SCORES, SECOND
@@ -44,7 +44,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
     ]
     ranked = sorted(
         comparison.standings,
-        key=lambda own: [own.estimates[name].mean or 0.0 for name in (metric.name, SECOND)],
+        key=lambda own: [_over_all(own, name) for name in (metric.name, SECOND)],
         reverse=True,
     )
     body = [
@@ -71,6 +71,12 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
     fewer = "" if count == suite.trials else f", {count} of {suite.trials} trials of each combination"
     told = f"# {suite.name}{fewer}\n\n{suite.model.title}. Hash `{suite.hash}`."
     return f"{told}\n\n{markdown_table(head, body)}\n{NOTE}\n"
+
+
+def _over_all(standing: Standing, name: str) -> float:
+    """Return the mean of a column over all trials; one that came to nothing counts 0, so no crash hides a trial."""
+    found = standing.estimates[name]
+    return (found.mean or 0.0) * found.count / max(1, standing.trials)
 
 
 def _sum(estimate: Estimate) -> float | None:

@@ -45,8 +45,11 @@ class Punctuality:
         self._missed[car] += 1
 
     def fades(self, car: str) -> bool:
-        """Tell whether `car` has been without a command for longer than ever between two of its commands."""
-        return self._missed[car] > self._longest[car]
+        """Tell whether `car` has been without a command for longer than ever between two of its commands.
+
+        Who has sent one command at most has no habit from which to tell.
+        """
+        return len(self.answers[car]) > 1 and self._missed[car] > self._longest[car]
 
     def slip(self, behind: float, tick: float) -> bool:
         """Note that a frame is `behind` seconds late; return whether it has slipped, by more than a `tick`."""

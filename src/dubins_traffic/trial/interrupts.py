@@ -54,7 +54,8 @@ def heard_between_frames() -> Generator[None]:
         yield
     finally:
         for number, handler in before.items():
-            if callable(handler):
+            # Who has been heard once keeps its default action, so that the second ends a process in a later trial, too.
+            if callable(handler) and signal.getsignal(number) is not signal.SIG_DFL:
                 signal.signal(number, handler)
 
 

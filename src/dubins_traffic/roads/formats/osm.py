@@ -25,7 +25,7 @@ ROADS = TWO_LANES | {
 }  # fmt: skip
 """Kinds of ways that are roads."""
 _NUMBER = re.compile(r"\d{1,3}(\.\d{1,6})?")
-_FEET = re.compile(r"(\d{1,3}(?:\.\d{1,6})?)\s*(?:ft|')\s*(\d*)")
+_FEET = re.compile(r"(\d{1,3}(?:\.\d{1,6})?)\s*(?:ft|feet|foot|')\s*(\d*)")
 _FOOT = 0.3048
 """Metres."""
 
