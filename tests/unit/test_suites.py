@@ -106,6 +106,23 @@ def ran(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return run_suite(Suite.from_document(document()), folder, workers=1)
 
 
+def test_a_trial_that_came_to_nothing_counts_nothing_in_the_ranking(ran: Path, tmp_path: Path) -> None:
+    """Else who kills his own process where he has done badly would be ranked by the rest."""
+    suite = Suite.from_document(document())
+    file = json.loads(ran.read_text())
+    names = [entry["controller"] for entry in file["entries"]]
+    for entry, rounds in zip(file["entries"], ([9, 0, 0, 0], [3, 3, 3, 3]), strict=False):
+        columns = entry["columns"]
+        columns["counted_rounds"] = rounds
+        if rounds[1] == 0:
+            for name, values in columns.items():
+                columns[name] = [values[0], *("crashed" if name == "end" else None for _ in values[1:])]
+    crashing = tmp_path / ran.name
+    crashing.write_text(json.dumps(file))
+    table = results(suite, open_sources([str(crashing)]))[TABLE]
+    assert table.index(f"| {names[1]} |") < table.index(f"| {names[0]} |")
+
+
 def test_the_numbers_of_the_page_are_those_of_the_file(ran: Path) -> None:
     suite = Suite.from_document(document())
     made = results(suite, open_sources([str(ran)]))
