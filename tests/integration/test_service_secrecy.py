@@ -16,6 +16,8 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
+from dubins_traffic.competition.keys import make_key_file
+from dubins_traffic.errors import InputError
 from dubins_traffic.service import viewing
 from dubins_traffic.service.hiding import HiddenError
 from dubins_traffic.service.office import Office
@@ -160,6 +162,9 @@ def shown_to_organisers(organiser: Person, number: int) -> None:
 
 def unreadable(folder: Path, other: Path, number: int) -> None:
     """With another key nothing can be read, and nothing of one trial stands for another."""
+    with pytest.raises(InputError, match="no such key, and the folder has competitions"):
+        Office(folder, other)
+    make_key_file(other, folder)
     office, own = Office(folder, other), Office(folder, folder.with_suffix(".key"))
     with office.database.reading() as session:
         submission = session.get_one(Submission, number)
