@@ -9,6 +9,7 @@ import subprocess
 import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
+from functools import cache
 from pathlib import Path
 from threading import Timer
 from typing import Any
@@ -25,9 +26,13 @@ def interpreter_with(tool: str) -> str:
 
 
 def sumo_program(name: str) -> str:
-    """Return the path of one of SUMO's own programs, in its package: it runs wherever the environment stands."""
+    """Return the path of one of SUMO's own programs, in its package: it runs wherever the environment stands.
+
+    Where it can't start, for want of a library of the system, it counts as not there.
+    """
     environment = Path(interpreter_with("sumo")).parents[1]
-    return str(next(environment.glob("lib/python*/site-packages/sumo/bin")) / name)
+    path = str(next(environment.glob("lib/python*/site-packages/sumo/bin")) / name)
+    return _found(path if _starts(path) else "", name)
 
 
 def program(name: str) -> str:
@@ -105,9 +110,17 @@ def solvers() -> Iterator[Solvers]:
         yield made
 
 
+@cache
+def _starts(path: str) -> bool:
+    return (
+        subprocess.run([path, "--version"], check=False, capture_output=True, timeout=PATIENCE_S).returncode
+        == 0
+    )
+
+
 def _found(path: str, name: str) -> str:
     if not Path(path).is_file():
-        reason = f"{name} is not here: scripts/crosscheck-tools.sh installs it"
+        reason = f"{name} is not here, or does not start: `make tools` installs it"
         if os.environ.get("CI") == "true":
             pytest.fail(reason)
         pytest.skip(reason)
