@@ -152,13 +152,13 @@ def test_a_record_says_how_its_trial_ended(
     assert [own["end"] for own in found] == [end, None]
 
 
-CASES = ["suite", "run", "adversary-2026", "--controller", "own.py:Raises", "-o", "out", "--workers", "1"]
+BY_FAULTY = ["suite", "run", "adversary-2026", "--controller", "own.py:Raises", "-o", "out", "--workers", "1"]
 """The command that runs a controller that raises on a suite of cases."""
 
 
 def test_a_suite_of_cases_counts_no_crash_as_clean(capsys: pytest.CaptureFixture[str]) -> None:
     for more in ([], ["--resume"]):
-        assert main([*CASES, *more]) == 1
+        assert main([*BY_FAULTY, *more]) == 1
         out, err = capsys.readouterr()
         rows = {line.split(" | ")[0]: line for line in out.splitlines()}
         assert "0 of 57" in rows["| clean"]
@@ -175,13 +175,13 @@ def test_a_suite_of_cases_counts_no_crash_as_clean(capsys: pytest.CaptureFixture
 
 
 def test_cases_that_were_damaged_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(CASES) == 1
+    assert main(BY_FAULTY) == 1
     kept = Path("out/cases.jsonl")
     first, second, *rest = kept.read_text().splitlines()
     for row in ({}, [], "x"):
         line = json.loads(second)
         kept.write_text("\n".join([first, json.dumps({**line, "row": row}), *rest]))
-        assert main([*CASES, "--resume"]) == 2
+        assert main([*BY_FAULTY, "--resume"]) == 2
     assert "can't be read as results" in capsys.readouterr().err
 
 
