@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable
 from pathlib import Path
@@ -143,6 +144,22 @@ def test_two_outputs_are_two_files(place: Path, capsys: pytest.CaptureFixture[st
     assert main(["run", "demo.json", "-F", "my.py"]) == 2
     assert "my.py: not a name of trial data" in capsys.readouterr().err
     assert held(place) == before
+
+
+def test_the_road_network_that_a_configuration_names_is_not_replaced(
+    place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = json.loads((place / "demo.json").read_text())
+    (place / "named.json").write_text(json.dumps({**document, "rnd": "grid.json"}))
+    before = held(place)
+    for words in (
+        ["run", "named.json", "--trials", "1", "-F", "grid.json"],
+        ["instance", "named.json", "-o", "grid.json", "--overwrite"],
+        ["run", "demo.json", "--trials", "1", "--rnd", "grid.json", "-F", "grid.json"],
+    ):
+        assert main(words) == 2, words
+        assert "grid.json" in capsys.readouterr().err
+        assert held(place) == before
 
 
 def writers() -> dict[str, tuple[str, Callable[..., object]]]:

@@ -10,7 +10,7 @@ from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
 
 from dubins_traffic.campaign.campaign import Campaign, load_campaign, seed_of
-from dubins_traffic.campaign.chunks import LEAST_CAR_STEPS, MOST_CAR_STEPS, cost
+from dubins_traffic.campaign.chunks import LEAST_CAR_STEPS, MOST_CAR_STEPS, Pace, cost
 from dubins_traffic.campaign.factors import put, raised, scalar, vary
 from dubins_traffic.campaign.folder import remaining
 from dubins_traffic.campaign.schema import campaign_schema, shipped_campaign_schema
@@ -248,3 +248,15 @@ def test_what_is_left_of_the_work() -> None:
         for k in range(chunk.count)
     }
     assert all(place == (("lanes", "simple")[n // 10], n % 10) for n, place in trials.items())
+
+
+def test_what_was_never_asked_tells_nothing_of_the_pace() -> None:
+    chunks = list(made(controllers=["simple"], chunk=10).chunks())
+    pace, sizes = Pace(), list[int]()
+    answers = iter([None, None, 0.01])
+    for chunk in pace.pieces(chunks):
+        sizes.append(chunk.count)
+        pace.note(chunk, next(answers, None))
+    assert sizes[:3] == [1, 1, 1]
+    assert len(set(sizes[3:])) == 1, "an answer that is known stays known"
+    assert sum(sizes) == 10

@@ -242,6 +242,12 @@ def test_an_action_of_another_shape_is_refused(action: Any) -> None:
     assert one.step([0.5, 0.5])[4]["cost"]
 
 
+@pytest.mark.parametrize("actions", [(step for step in range(2)), {0.5}, object(), np.array(0.5), "up"])
+def test_commands_are_asked_of_a_sequence_of_actions(actions: Any) -> None:
+    with pytest.raises(InputError, match=r"action: not an action"):
+        single().commands(actions)
+
+
 @pytest.mark.parametrize("action", [[3], 0.5, None, [[1]]])
 def test_a_discrete_action_of_another_shape_is_refused(action: Any) -> None:
     one, many = single(action="discrete"), vector(1, action="discrete")

@@ -135,9 +135,10 @@ class Pace:
                 yield chunk.part(number, end)
                 number = end
 
-    def note(self, chunk: Chunk, answer_s: float) -> None:
-        """Note how long the controller of a chunk took for an answer, seconds."""
-        self._answer_s[chunk.controller] = answer_s
+    def note(self, chunk: Chunk, answer_s: float | None) -> None:
+        """Note how long the controller of a chunk took for an answer, seconds; None, of nobody asked, tells nothing."""
+        if answer_s is not None:
+            self._answer_s[chunk.controller] = answer_s
 
     def _trials(self, chunk: Chunk) -> int:
         return fitting(self._answer_s.get(chunk.controller), ticks(chunk.configuration), chunk.count)

@@ -92,10 +92,10 @@ def part_schema(metrics: Sequence[Column] = ()) -> Any:
     return made.schema([(name, getattr(made, names.get(kind, kind))()) for name, kind in types.items()])
 
 
-def answer_s(part: bytes) -> float:
-    """Return how long an answer took in the trials of a part, seconds, on average; 0 if nobody was asked."""
+def answer_s(part: bytes) -> float | None:
+    """Return how long an answer took in the trials of a part, seconds, on average; None if nobody was asked."""
     found = arrow().parquet.read_table(BytesIO(part), columns=["act_mean_s"])["act_mean_s"]
-    return arrow().compute.mean(found).as_py() or 0.0
+    return arrow().compute.mean(found).as_py()
 
 
 def encoded(found: Columns, metrics: Sequence[Column] = ()) -> bytes:

@@ -34,8 +34,9 @@ def instance(
     from dubins_traffic.problem.draw import draw
     from dubins_traffic.problem.files import DOCUMENTS, dumps
 
-    options.require(output, "an instance", DOCUMENTS, overwrite=overwrite, apart_from=[config], standard=True)
     configuration = load_config(config)
+    read = [config, configuration.network_file]
+    options.require(output, "an instance", DOCUMENTS, overwrite=overwrite, apart_from=read, standard=True)
     maps.report(configuration.network)
     drawn = draw(configuration, seed, trial)
     options.write(dumps(instance_to_document(drawn, version=1 if full else 0)), output)

@@ -80,8 +80,10 @@ class ActionMap:
         InputError
             If they are no actions.
         """
-        many: Any = actions  # np.iterable would narrow it to what has no length
-        count: int = len(many) if np.iterable(actions) else 1
+        try:
+            count = len(actions)
+        except TypeError:
+            count = 1
         shares = np.zeros((count, 2))
         self.put(actions, shares)
         if not np.isfinite(shares).all():

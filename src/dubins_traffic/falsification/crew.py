@@ -74,12 +74,12 @@ class Lot:
     instances: tuple[Instance, ...]
 
     def run(self, cancelled: Callable[[], bool]) -> bytes:
-        """Run the trials; return what came of them, and how long their controller took for an answer, pickled."""
+        """Run the trials; return what came of them, and how long their controller takes for an answer, pickled."""
         if self.controller not in _laboratories:
             _laboratories[self.controller] = Laboratory(self.controller)
         laboratory = _laboratories[self.controller]
         laboratory.cancelled = cancelled
-        return pickle.dumps((in_order(laboratory.attempt(self.instances)), laboratory.answer_s or 0.0))
+        return pickle.dumps((in_order(laboratory.attempt(self.instances)), laboratory.answer_s))
 
 
 _laboratories: dict[str, Laboratory] = {}
@@ -113,7 +113,7 @@ class Elsewhere:
                 under_way -= 1
                 lot = outcome.chunk
                 if outcome.part is not None:
-                    found: tuple[list[Tried], float] = pickle.loads(outcome.part)
+                    found: tuple[list[Tried], float | None] = pickle.loads(outcome.part)
                     tried, self._answer_s = found
                     yield dict(enumerate(tried, lot.first))
                     continue

@@ -173,9 +173,13 @@ class Laboratory:
         return fitting(self.answer_s, max(own.ticks for own in instances), most)
 
     def _note(self, summaries: Iterable[Mapping[str, float]]) -> None:
-        """Note how long the controller took for an answer in trials, by the summaries of their latencies."""
+        """Note how long the controller took for an answer in trials, by the summaries of their latencies.
+
+        Trials in which it was never asked, since its start failed, tell nothing of that.
+        """
         means = [own["mean"] for own in summaries if own]
-        self.answer_s = sum(means) / len(means) if means else 0.0
+        if means:
+            self.answer_s = sum(means) / len(means)
 
     def _check(self) -> None:
         if self.cancelled():
@@ -183,6 +187,7 @@ class Laboratory:
 
     def _finished(self, instances: Sequence[Instance]) -> Group:
         """Return trials that have been run without asking anybody for commands in Python."""
+        self.answer_s = 0.0
         if not self._lanes:
             group = Group(instances, keeps_rules=True)
             group.finish(self.cancelled)

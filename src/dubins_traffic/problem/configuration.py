@@ -50,6 +50,8 @@ class Configuration:
         The e-agents, counts multiplied out.
     file : str or None
         The file from which it was read.
+    network_file : str or None
+        The file from which its road network was read, if it names one.
     """
 
     document: Mapping[str, Any]
@@ -57,6 +59,7 @@ class Configuration:
     network: RoadNetwork | None
     agents: tuple[PlannedAgent, ...]
     file: str | None = None
+    network_file: str | None = None
     kept: dict[str, object] = field(default_factory=dict[str, object], init=False, repr=False, compare=False)
     """What has been worked out of the rest once; not part of it, and left behind when it is pickled."""
 
@@ -70,7 +73,8 @@ class Configuration:
         return f"<Configuration: {', '.join(parts)}>"
 
     def __reduce__(self) -> tuple[object, ...]:
-        return Configuration, (self.document, self.settings, self.network, self.agents, self.file)
+        parts = self.document, self.settings, self.network, self.agents, self.file, self.network_file
+        return Configuration, parts
 
     @staticmethod
     def from_document(
@@ -104,14 +108,15 @@ class Configuration:
             folder = None
         settings = settings_of(own, file)
         try:
-            network = _network(settings, folder)
+            network_file = _network_file(settings, folder)
+            network = _network(settings, network_file)
             agents = plan_agents(settings.e_agents)
             if network is not None:
                 for k, goal in enumerate(settings.goals or ()):
                     check_goal(network, goal, k)
         except InputError as error:
             raise error.within(file=file) from None
-        return Configuration(own, settings, network, agents, file)
+        return Configuration(own, settings, network, agents, file, network_file)
 
     def with_simulator(self, name: str) -> Configuration:
         """Return the configuration with another simulator; its document stays as it was read."""
@@ -243,23 +248,30 @@ def settings_of(document: Mapping[str, Any], file: str | None = None) -> Setting
     return parse(Settings, document, file=file)
 
 
-def _network(settings: Settings, folder: Path | None) -> RoadNetwork | None:
-    """Return the network that is the same in all trials, None where each draws its own."""
+def _network_file(settings: Settings, folder: Path | None) -> str | None:
+    """Return the file that the settings name as their road network, ``-`` for standard input, None for no file."""
     file = None if settings.network is None else settings.network.file
     field, rnd = ("rnd", settings.rnd) if file is None else ("network.file", file)
-    if rnd is None:
-        return None
-    if not isinstance(rnd, str):
-        try:
-            return RoadNetwork.from_document(rnd)
-        except InputError as error:
-            raise error.within(field="rnd") from None
+    if not isinstance(rnd, str) or rnd == "-":
+        return rnd if isinstance(rnd, str) else None
     beside = (folder or Path()) / rnd
     path = beside if is_file(beside) else Path(rnd)
-    if rnd != "-" and not exists(path):
+    if not exists(path):
         expected = "a file beside the configuration or in the current directory"
         raise InputError("no such file", field=field, value=rnd, expected=expected)
-    return RoadNetwork.read(rnd if rnd == "-" else str(path))
+    return str(path)
+
+
+def _network(settings: Settings, file: str | None) -> RoadNetwork | None:
+    """Return the network of all trials, read from `file` if one is named; None where each draws its own."""
+    if file is not None:
+        return RoadNetwork.read(file)
+    if settings.rnd is None:
+        return None
+    try:
+        return RoadNetwork.from_document(settings.rnd)
+    except InputError as error:
+        raise error.within(field="rnd") from None
 
 
 def plan_agents(entries: list[AgentEntry]) -> tuple[PlannedAgent, ...]:

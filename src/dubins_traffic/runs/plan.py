@@ -167,7 +167,7 @@ def plan(
         jobs = [Job(instance.trial, instance.seed, controller, instance=instance)]
     if (first := jobs[0].instance) is not None:
         _check_first(os.fspath(source), first, controller, named=simulator is not None, show=show)
-    target = None if data is None else check_data_file(Path(data), overwrite_data, source, rnd)
+    target = None if data is None else check_data_file(Path(data), overwrite_data, source, configuration)
     jobs = [replace(job, deadline=deadline, show=show, metrics=further) for job in jobs]
     if records is None:
         return Plan(tuple(job for job in jobs for _ in range(repeat)), configuration, target)
@@ -279,13 +279,17 @@ def _check_deadline(deadline: float | None) -> None:
         raise InputError("not a time", file="--deadline", value=deadline, expected="seconds, a number > 0")
 
 
-def check_data_file(path: Path, overwrite: bool, *read: str | os.PathLike[str] | None) -> Path:
+def check_data_file(
+    path: Path, overwrite: bool, source: str | os.PathLike[str], configuration: Configuration | None
+) -> Path:
     """Return `path` if trial data can be written there; InputError, as of `files.require_output`, if not.
 
-    `overwrite` is whether a file that exists may be replaced, and `read` what is read and so never is.
+    `overwrite` is whether a file that exists may be replaced. The `source` of the trials, and the road network that its
+    `configuration` names, never are.
     """
     if exists(path) and not is_stream(path) and not overwrite:
         expected = "a new file; --overwrite-trial-data (-F) overwrites"
         raise InputError("exists", file=str(path), expected=expected)
+    read = source, None if configuration is None else configuration.network_file
     require_output(path, "trial data", DOCUMENTS, overwrite=True, apart_from=read)
     return path

@@ -298,7 +298,7 @@ def session_plan(
         controller,
         tuple(remote),
         None if records is None else check_folder(records),
-        None if data is None else check_data_file(Path(data), overwrite_data, source, rnd),
+        None if data is None else check_data_file(Path(data), overwrite_data, source, configuration),
         shield,
         overwrite,
         append,
