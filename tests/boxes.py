@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 import pytest
@@ -11,7 +12,10 @@ from dubins_traffic.sandbox import BoxedController, Limits, available_layers, bo
 from tests.recordings import make_instance
 
 MISSING = available_layers().missing()
-needs_boxes = pytest.mark.skipif(bool(MISSING), reason=f"no boxes on this machine: {'; '.join(MISSING)}")
+needs_boxes = pytest.mark.skipif(
+    bool(MISSING) and os.environ.get("CI") != "true", reason=f"no boxes on this machine: {'; '.join(MISSING)}"
+)
+"""What skips a test where programs of strangers can't be held; under CI it goes on, and fails."""
 
 HEAD = """
 import os, sys, time, ctypes, socket, subprocess, threading

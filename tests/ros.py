@@ -32,7 +32,15 @@ PATIENCE = 600.0
 def need_ros() -> None:
     """Skip the test, or fail it under CI, where Debian's ROS packages are missing."""
     lacking = [name for name in ("rospy", "rosmaster", "roslib") if not Path(DIST_PACKAGES, name).is_dir()]
-    lacking += [name for name in ("roscore", "g++") if shutil.which(name) is None]
+    _need([*lacking, *(name for name in ("roscore", "g++") if shutil.which(name) is None)])
+
+
+def need_compiler() -> None:
+    """Skip the test, or fail it under CI, where no program in C++ can be made."""
+    _need([name for name in ("make", "g++") if shutil.which(name) is None])
+
+
+def _need(lacking: Sequence[str]) -> None:
     if lacking:
         reason = f"{', '.join(lacking)}: not here; scripts/system-packages.sh installs it"
         if os.environ.get("CI") == "true":

@@ -30,7 +30,9 @@ from dubins_traffic.competition.templates import write_template
 from dubins_traffic.competition.visibility import SubmissionState, visible
 from dubins_traffic.errors import InputError
 from dubins_traffic.runs.single import run_trial
+from tests.boxes import needs_boxes
 from tests.competitions import CONTROLLERS, IDLE, KEY, PRACTICE, ROAD, TEST, competition
+from tests.ros import need_compiler
 
 ROOT = Path(__file__).parents[2]
 SHORT = {**ROAD, "duration": 6}
@@ -65,6 +67,7 @@ def command(
     return run
 
 
+@needs_boxes
 def test_frames_are_the_same_in_any_order_and_number_of_workers(tmp_path: Path) -> None:
     phase, submission = short(8).phase("practice"), entry("speaks_lines", tmp_path / "store")
     first = evaluate(phase, submission, tmp_path / "one")
@@ -77,6 +80,7 @@ def test_frames_are_the_same_in_any_order_and_number_of_workers(tmp_path: Path) 
     assert {own.end for own in first.results} == {"duration"}
 
 
+@needs_boxes
 def test_the_box_changes_no_frame(tmp_path: Path) -> None:
     phase, submission = short(3).phase("practice"), entry("homes", tmp_path / "store")
     boxed = list(judge(phase, phase.numbers, submission))
@@ -88,6 +92,7 @@ def test_the_box_changes_no_frame(tmp_path: Path) -> None:
         assert "goals" in own.log
 
 
+@needs_boxes
 def test_what_is_finished_is_not_run_again(tmp_path: Path) -> None:
     phase, submission = short(4).phase("practice"), entry("speaks_lines", tmp_path / "store")
     whole = evaluate(phase, submission, tmp_path / "out")
@@ -105,6 +110,7 @@ def test_what_is_finished_is_not_run_again(tmp_path: Path) -> None:
         evaluate(short(5).phase("practice"), submission, tmp_path / "out")
 
 
+@needs_boxes
 def test_records_hold_what_was_judged(tmp_path: Path) -> None:
     phase, submission = short(2).phase("practice"), entry("speaks_lines", tmp_path / "store")
     found = evaluate(phase, submission, tmp_path / "out", records=True)
@@ -114,6 +120,7 @@ def test_records_hold_what_was_judged(tmp_path: Path) -> None:
         assert record.controller == submission.digest[:12]
 
 
+@needs_boxes
 def test_entries_that_do_not_drive_rank_last(tmp_path: Path) -> None:
     phase = competition(phases={"practice": {**PRACTICE, "trials": 2}}).phase("practice")
     entries = {name: list(judge(phase, phase.numbers, entry(name, tmp_path))) for name in ("rules", *IDLE)}
@@ -130,6 +137,7 @@ def test_entries_that_do_not_drive_rank_last(tmp_path: Path) -> None:
     assert owners["stands"] == {None}
 
 
+@needs_boxes
 def test_what_is_finished_is_kept_on_a_full_disk(tmp_path: Path) -> None:
     phase, submission = short(3).phase("practice"), entry("speaks_lines", tmp_path / "store")
     whole = evaluate(phase, submission, tmp_path / "one")
@@ -161,6 +169,7 @@ def test_a_trial_that_can_not_be_drawn_is_no_fault_of_the_submission(tmp_path: P
         seal(found.phase("test"), KEY)
 
 
+@needs_boxes
 def test_other_seeds_of_a_test_phase_show_the_same(tmp_path: Path) -> None:
     seen: list[str] = []
     frames: list[str | None] = []
@@ -180,6 +189,7 @@ def test_other_seeds_of_a_test_phase_show_the_same(tmp_path: Path) -> None:
     assert seen[0] == seen[1]
 
 
+@needs_boxes
 def test_a_season_on_the_command_line(
     tmp_path: Path, command: Callable[..., subprocess.CompletedProcess[str]]
 ) -> None:
@@ -235,6 +245,7 @@ def test_a_season_on_the_command_line(
     )
 
 
+@needs_boxes
 def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
     shutil.copytree(ROOT / "examples" / "competition", tmp_path / "spring")
@@ -262,7 +273,9 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     assert 3 <= kept < 200
 
 
+@needs_boxes
 def test_the_templates_pass_as_they_are_and_drive_alike(tmp_path: Path) -> None:
+    need_compiler()
     write_template("python", tmp_path / "python")
     write_template("cpp", tmp_path / "cpp")
     subprocess.run(
@@ -280,6 +293,7 @@ def test_the_templates_pass_as_they_are_and_drive_alike(tmp_path: Path) -> None:
     }
 
 
+@needs_boxes
 def test_results_kept_in_the_folder_of_an_entry_are_no_part_of_it(
     tmp_path: Path, command: Callable[..., subprocess.CompletedProcess[str]]
 ) -> None:
@@ -295,6 +309,7 @@ def test_results_kept_in_the_folder_of_an_entry_are_no_part_of_it(
         assert "lies in what is evaluated" in refused.stderr
 
 
+@needs_boxes
 def test_where_there_is_no_box_an_entry_runs_if_it_is_trusted_with_the_same_frames(
     tmp_path: Path, command: Callable[..., subprocess.CompletedProcess[str]]
 ) -> None:
@@ -325,6 +340,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
+@needs_boxes
 def test_evaluating_needs_no_extra(tmp_path: Path) -> None:
     (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
     words = ["evaluate", "entry", "--competition", str(ROOT / "examples" / "competition"), "--json"]

@@ -20,6 +20,7 @@ from dubins_traffic.falsification.search import falsify
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.runs.single import run_trial
+from tests.boxes import needs_boxes
 
 CASES = Path(__file__).parent.parent / "cases"
 SPRING = Path(__file__).parents[2] / "examples" / "competition"
@@ -108,6 +109,7 @@ def test_run_and_batch_name_each(
     assert all(reason in line for line in lines)
 
 
+@needs_boxes
 @WHO
 def test_a_submission(who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("entry.py").write_text(CONTROLLERS + f"\n\nController = {who}\n")

@@ -18,6 +18,7 @@ from benchmarks.competition import ROADS, RULES, SWERVES
 
 from dubins_traffic.competition.templates import write_template
 from dubins_traffic.service.client import packed
+from tests.ros import need_compiler
 from tests.services import COMMAND, Person, Service, serving, wait_until
 
 TRIALS = int(os.environ.get("DUBINS_TRAFFIC_SERVED_TRIALS", "12"))
@@ -28,6 +29,7 @@ FINAL = ("done", "rejected", "failed", "cancelled")
 @pytest.fixture(scope="module")
 def entries(tmp_path_factory: pytest.TempPathFactory) -> Mapping[str, Path]:
     """Return what drives: our templates in two languages, a driver of ours, one that swerves by what it sees."""
+    need_compiler()
     folder = tmp_path_factory.mktemp("entries")
     for kind in ("python", "cpp"):
         write_template(kind, folder / kind)

@@ -10,7 +10,7 @@ import threading
 import traceback
 from collections.abc import Generator, Iterable, Sequence
 from itertools import pairwise
-from typing import TYPE_CHECKING, Final, NoReturn
+from typing import TYPE_CHECKING, Final, NoReturn, TextIO
 
 import typer
 
@@ -59,8 +59,10 @@ def conclude(error: Exception, arguments: Sequence[str]) -> int:
 
 def tell(text: str) -> None:
     """Print one line about something wrong on standard error."""
-    with contextlib.suppress(BrokenPipeError):  # whoever read it has had enough
+    try:
         print(f"{PROGRAM}: {shown(text)}", file=sys.stderr)
+    except BrokenPipeError:  # whoever read it has had enough
+        _discard(sys.__stderr__ or sys.stderr)
 
 
 def tell_failed(trials: Iterable[tuple[Instance, Ending]]) -> bool:
@@ -100,9 +102,14 @@ def conclude_exit(error: SystemExit, arguments: Sequence[str]) -> int:
 
 def _hang_up() -> int:
     """Discard what is still to be printed: the reader of standard output has closed it, which is no error."""
-    with contextlib.suppress(OSError, ValueError):
-        os.dup2(os.open(os.devnull, os.O_WRONLY), (sys.__stdout__ or sys.stdout).fileno())
+    _discard(sys.__stdout__ or sys.stdout)
     return OK
+
+
+def _discard(stream: TextIO) -> None:
+    """Let a stream that its reader has closed lead nowhere: Python 3.11.2 fails at its end if it can't write the rest."""
+    with contextlib.suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def open_streams() -> None:

@@ -24,8 +24,8 @@ from dubins_traffic.service.worker import Worker, default_folder
 
 PACKAGE = "dubins-traffic"
 LOOK_S = 1.0
-FAREWELL_S = 60.0
-"""How long actors are waited for that have been told to end."""
+FAREWELL_S = 300.0
+"""How long actors are waited for that have been told to end; on a busy node one may take minutes."""
 log = structlog.get_logger("dubins_traffic.worker")
 
 
