@@ -107,7 +107,7 @@ def _hang_up() -> int:
 
 
 def _discard(stream: TextIO) -> None:
-    """Let a stream that its reader has closed lead nowhere: Python 3.11.2 fails at its end if it can't write the rest."""
+    """Let a stream that its reader has closed lead nowhere: Python 3.11.2 fails at its end if it can't write to it."""
     with contextlib.suppress(OSError, ValueError):
         os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
