@@ -143,13 +143,15 @@ class RuleParameters:
             If a name is no parameter, or a value is refused as the class says.
         """
         values = tuple(rules.values())
-        if all(type(value) in (int, float) for value in values):
-            return _checked(tuple(rules), values, tuple(map(type, values)))
-        return _made(rules)
+        types = tuple(map(type, values))
+        return _checked(tuple(rules), values, types) if _NUMBERS.issuperset(types) else _made(rules)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return all parameters by name, in the order of their definition."""
         return asdict(self)
+
+
+_NUMBERS = frozenset((int, float))
 
 
 @lru_cache(maxsize=256)
