@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import signal
-import subprocess
 import sys
 from contextlib import suppress
 from pathlib import Path
@@ -48,4 +47,5 @@ def replace(process: int, cache: Path) -> None:
     while process in companions(cache):
         sleep(0.01)
     around = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "DUBINS_TRAFFIC_KERNELS": "auto"}
-    subprocess.Popen([sys.executable, "-m", "dubins_traffic.kernels.companion"], env=around)
+    words = [sys.executable, "-m", "dubins_traffic.kernels.companion"]
+    os.spawnve(os.P_NOWAIT, words[0], words, around)
