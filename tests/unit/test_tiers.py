@@ -147,6 +147,27 @@ def test_a_companion_for_which_nobody_waits_leaves_processors_to_all_others(cach
     finished(waiting)
 
 
+HEARD_LATER = """
+import ctypes, os
+from contextlib import suppress
+from dubins_traffic.kernels import companion
+os.setsid()
+if os.getuid() == 0:
+    os.setgid(65534)
+    os.setuid(65534)
+    ctypes.CDLL(None).prctl(4, 1)  # PR_SET_DUMPABLE: who gave up root may write to his own /proc again
+with suppress(BlockingIOError):
+    companion.SESSION.write_bytes(b"0")  # Linux hears ordinary users once in a tenth of a second: the next has to wait
+companion._stand_back_as_session()
+print(companion.SESSION.read_bytes().split()[-1].decode())
+"""
+
+
+@pytest.mark.skipif(not companion.SESSION.exists(), reason="this Linux does not share processors among sessions")
+def test_a_companion_stands_back_though_linux_hears_it_only_later(cache) -> None:
+    assert python(cache, HEARD_LATER) == (f"{companion.NICE}\n", "")
+
+
 def test_processes_at_once_have_one_companion(cache) -> None:
     several = [begin(cache, CALL, "compiled") for _ in range(4)]
     assert [finished(process)[0] for process in several] == [f"{sincos(0.5)}\n"] * 4

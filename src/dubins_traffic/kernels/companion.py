@@ -28,6 +28,8 @@ NICE = 19
 """How much the companion stands back behind others."""
 SESSION = Path("/proc/self/autogroup")
 """Where Linux is told how much the processes of a session stand back behind those of others."""
+HEARD = 2.0
+"""Seconds for which it tries to tell Linux so, while others do the same."""
 LINGER = 5.0
 """Seconds for which it waits for more to do."""
 LONGEST = 600.0
@@ -63,9 +65,22 @@ def _stand_back() -> None:
     """
     os.nice(NICE)
     with contextlib.suppress(OSError):
-        SESSION.write_text(str(NICE), encoding="ascii")
+        _stand_back_as_session()
     with contextlib.suppress(OSError, AttributeError):
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+
+
+def _stand_back_as_session() -> None:
+    """Let the whole session stand back; of all ordinary users, Linux hears one in a tenth of a second."""
+    until = monotonic() + HEARD
+    while True:
+        try:
+            SESSION.write_bytes(str(NICE).encode())
+            return
+        except BlockingIOError:
+            if monotonic() > until:
+                return
+            sleep(PAUSE)
 
 
 def _make_room() -> None:
