@@ -29,14 +29,16 @@ def _simple(value: Any) -> Any:
 def decoded_score(score: dt.Score) -> bytes:
     """Return a score without the record's place and what a wall clock measured.
 
-    The margins of rule 3, those of formulas and the rounds before the first breach are left out: they are younger than
-    the hashes, and `tests/property/test_margin_signs.py`, `test_formula_margins.py` and `test_batch.py` have them.
+    The margins of rule 3, those of formulas, the rounds before the first breach and whether the trial was cut are left
+    out: they are younger than the hashes, and `tests/property/test_margin_signs.py`, `test_formula_margins.py`,
+    `test_batch.py` and `tests/unit/test_score_tables.py` have them.
     """
     document = score.to_json()
     for formula in document["formulas"]:
         del formula["robustness"]
     if document["verdict"] is not None:
         robustness = document["verdict"]["robustness"]
+        del document["verdict"]["cut"]
         document["verdict"] = {
             **document["verdict"],
             "robustness": {rule: robustness[rule] for rule in robustness if rule not in ENTERED},

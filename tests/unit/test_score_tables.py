@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from io import StringIO
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +17,15 @@ from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.cli import tables
 from dubins_traffic.protocols import End, Ending
+from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.scoring.clean import is_clean, was_cut
 from dubins_traffic.scoring.collisions import Collision
-from dubins_traffic.scoring.duration import counted_rounds, ran_whole
+from dubins_traffic.scoring.duration import ran_whole
 from dubins_traffic.scoring.notice import assumption_notice
 from dubins_traffic.scoring.paper import network_size, paper_score
-from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet, is_clean
+from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet
 from dubins_traffic.scoring.verdict import Excuse, Place, Ruling, Verdict, Violation
 from tests.recordings import feed, make_frames, make_instance
 from tests.rules_scripts import KITE, STAR
@@ -31,13 +33,13 @@ from tests.rules_scripts import KITE, STAR
 BREACH = Violation("2.left", "agent0", 1.0, 30, 1.0, Place(0.0, 0.0, None, None))
 
 
-def verdict(ruling: str = "satisfied", *, fallen: bool = False) -> Verdict:
+def verdict(ruling: str = "satisfied", *, fallen: bool = False, cut: bool = False) -> Verdict:
     excused = ruling == "excused"
     excuse = Excuse("E1", BREACH, False) if excused else None
     formulas = {"E1": "false" if fallen or excused else "presumably true"}
-    clean = ruling in ("satisfied", "unfinished")
+    clean = ruling in ("satisfied", "unfinished") and not cut
     near = False if excused else None
-    found = Verdict(Ruling(ruling), clean, excuse, near, (), (), 2, 1.0, 9.0, {}, {})
+    found = Verdict(Ruling(ruling), clean, cut, excuse, near, (), (), 2, 1.0, 9.0, {}, {})
     return replace(found, formulas=formulas)
 
 
@@ -163,16 +165,32 @@ def test_a_trial_ran_whole_if_all_its_ticks_are_there() -> None:
     assert not ran_whole(instance, None, 90)
 
 
-def test_rounds_count_if_the_trial_is_clean_and_whole() -> None:
-    assert [counted_rounds(3, clean=c, whole=w) for c, w in product((True, False), repeat=2)] == [3, 0, 0, 0]
+def test_a_trial_is_clean_if_it_ran_whole_and_the_ego_broke_nothing() -> None:
     hit = Collision(1.0, 30, "ego", "agent0", False, True)
-    whole, quit_ = Ending(End.DURATION, 90), Ending(End.GAVE_UP, 60)
-    assert is_clean(None, (), whole)
-    assert is_clean(None, (), None)
-    assert not is_clean(None, (hit,), whole)
-    assert not is_clean(None, (), quit_)
-    assert is_clean(verdict(), (hit,), quit_), "a verdict knows"
-    assert not is_clean(verdict("violated"), (), whole)
+    assert is_clean(None, (), whole=True)
+    assert not is_clean(None, (), whole=False)
+    assert not is_clean(None, (hit,), whole=True)
+    assert is_clean(verdict(), (hit,), whole=True), "a verdict knows"
+    assert not is_clean(verdict("violated"), (), whole=True)
+
+
+@pytest.mark.parametrize("end", [*End, None])
+def test_what_others_or_the_user_end_is_cut_neither_clean_nor_not(end: End | None) -> None:
+    instance = make_instance(goals=[(0, 0)], ticks=90)
+    instance = replace(instance, problem=replace(instance.problem, rules=RuleParameters().to_mapping()))
+    scorer = Scorer()
+    scorer.begin(instance)
+    scorer.frames(make_frames(instance, [(0.2, -0.3)] * 4))
+    if end is not None:
+        scorer.end(Ending(end, 3))
+    found = scorer.result()
+    assert found.verdict is not None
+    by_controller = end in BY_CONTROLLER
+    assert (found.verdict.clean, found.verdict.cut) == (False, not by_controller)
+    assert was_cut(found.verdict.verdict, found.verdict.clean, found.end) == found.verdict.cut
+    assert found.counted_rounds == 0, "who is cut wins nothing by it"
+    assert ScoreSheet((found,)).cut == (not by_controller)
+    assert ("cut" in text(found).split()) == (not by_controller)
 
 
 def test_the_paper_is_defined_everywhere() -> None:

@@ -55,6 +55,7 @@ def _document(record: str, score: Score) -> dict[str, Any]:
         "record": record,
         "end": score.end,
         "clean": None if verdict is None else verdict.clean,
+        "cut": None if verdict is None else verdict.cut,
         "verdict": None if verdict is None else verdict.verdict.value,
         "near": None if verdict is None else verdict.near,
         "violations": [] if verdict is None else [entry.to_json() for entry in verdict.violations],
@@ -89,7 +90,7 @@ def _show(record: str, ending: Ending | None, score: Score) -> None:
 
 
 def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
-    clean = "clean" if verdict.clean else "not clean"
+    clean = "clean" if verdict.clean else "cut" if verdict.cut else "not clean"
     gap = "" if verdict.longest_gap_s is None else f", longest gap {verdict.longest_gap_s:.1f} s"
     limit = "" if verdict.gap_limit_s is None else f" of {verdict.gap_limit_s:.1f} s allowed"
     line = f"{record}: {clean}, {verdict.verdict}, {verdict.rounds} rounds{gap}{limit if gap else ''}"

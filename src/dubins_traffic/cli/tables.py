@@ -76,8 +76,14 @@ def points(value: float | None) -> str:
     return "not defined" if value is None else f"{value:g}"
 
 
+def _clean(score: Score) -> str:
+    if score.verdict is None:
+        return "-"
+    return "cut" if score.verdict.cut else yes(score.verdict.clean)
+
+
 COLUMNS: dict[str, Column] = {
-    "clean": Column(lambda score: "-" if score.verdict is None else yes(score.verdict.clean), _is_judged),
+    "clean": Column(_clean, _is_judged),
     "counted rounds": Column(_counted, total=lambda sheet: str(sheet.counted_rounds_sum)),
     "before breach": Column(lambda score: f"{score.rounds_before_breach:.2f}", total=_mean_before_breach),
     "breaches": Column(_breaches, _is_judged, spare=1),

@@ -18,6 +18,7 @@ from dubins_traffic.competition.judging import OWNERS, Judged
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.protocols import End
+from dubins_traffic.scoring.clean import was_cut
 from dubins_traffic.scoring.columns import SCORES, SECOND
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE
 from dubins_traffic.scoring.verdict import Ruling
@@ -44,7 +45,9 @@ class Place:
     second : float
         Mean of the rounds before the first breach, which parts entries of equal means.
     satisfied, clean : Share
-        Of the trials, with Wilson's intervals: satisfied to the end; nothing broken.
+        Of the trials, with Wilson's intervals: satisfied to the end; nothing broken, of those that were not cut.
+    cut : int
+        Trials that others ended before the ego broke anything (docs/rules.md#cut); they count as all do in `estimate`.
     ties : tuple of str
         The other entries from which it can't be told: the interval of the paired differences holds 0.
     to_next : Estimate or None
@@ -58,6 +61,7 @@ class Place:
     second: float
     satisfied: Share
     clean: Share
+    cut: int
     ties: tuple[str, ...]
     to_next: Estimate | None
 
@@ -73,6 +77,7 @@ class Place:
             "satisfied": self.satisfied.share,
             "satisfied_interval": _ends(self.satisfied.interval),
             "clean": self.clean.share,
+            "cut": self.cut,
             "ties": list(self.ties),
             "to_next": None if self.to_next is None else self.to_next.mean,
             "to_next_interval": None if self.to_next is None else _ends(self.to_next.mean_interval),
@@ -87,6 +92,7 @@ class _Entry:
     second: float
     satisfied: int
     clean: int
+    cut: int
 
 
 def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
@@ -133,7 +139,8 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
                 _estimated(own.values.tobytes()),
                 own.second,
                 share(own.satisfied, count),
-                share(own.clean, count),
+                share(own.clean, count - own.cut),
+                own.cut,
                 tuple(sorted(beside)),
                 following,
             )
@@ -191,6 +198,11 @@ def is_clean(row: Mapping[str, Any]) -> bool:
     return bool(clean) and row["end"] == End.DURATION
 
 
+def is_cut(row: Mapping[str, Any]) -> bool:
+    """Tell whether others ended a trial before the ego broke anything."""
+    return was_cut(row["verdict"], row["clean"], row["end"])
+
+
 def holds_zero(found: Estimate) -> bool:
     """Tell whether differences are none that could be told from nothing; one difference alone tells nothing."""
     return (
@@ -214,7 +226,8 @@ def _entry(name: str, results: Sequence[Result], phase: Phase) -> _Entry:
     values = np.array([value(row, phase.ranking.metric) for row in rows], dtype=np.float64)
     mean = float(np.sum(values)) / len(values)
     second = math.fsum(value(row, SECOND) for row in rows) / len(rows)
-    return _Entry(name, values, mean, second, sum(map(is_satisfied, rows)), sum(map(is_clean, rows)))
+    counts = (sum(map(told, rows)) for told in (is_satisfied, is_clean, is_cut))
+    return _Entry(name, values, mean, second, *counts)
 
 
 def _merit(own: _Entry, phase: Phase) -> tuple[float, float, int]:

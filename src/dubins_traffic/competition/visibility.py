@@ -9,7 +9,7 @@ from typing import Any, Final, Literal
 
 from dubins_traffic.competition.competition import Phase
 from dubins_traffic.competition.judging import Judged
-from dubins_traffic.competition.ranking import is_clean, is_satisfied, missing, value
+from dubins_traffic.competition.ranking import is_clean, is_cut, is_satisfied, missing, value
 from dubins_traffic.scoring.columns import SECOND
 
 State = Literal[
@@ -145,7 +145,7 @@ def summary(phase: Phase, results: Sequence[Judged], digits: int | None = None) 
         metric: sum(value(row, metric) for row in rows) / len(rows),
         SECOND: sum(value(row, SECOND) for row in rows) / len(rows),
         "satisfied": sum(map(is_satisfied, rows)) / len(rows),
-        "clean": sum(map(is_clean, rows)) / len(rows),
+        "clean": sum(map(is_clean, rows)) / max(1, len(rows) - sum(map(is_cut, rows))),
     }
     told = {name: own if digits is None else round(own, digits) for name, own in found.items()}
     return {"trials": len(rows), **told}

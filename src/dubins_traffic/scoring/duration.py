@@ -31,11 +31,6 @@ def ran_whole(instance: Instance, ending: Ending | None, last: int) -> bool:
     )
 
 
-def counted_rounds(rounds: int, *, clean: bool, whole: bool) -> int:
-    """Return the rounds that count in a ranking: those of a clean trial that ran its whole duration, else 0."""
-    return rounds if clean and whole else 0
-
-
 def early_rounds(rounds: float, ending: Ending | None) -> float:
     """Return the rounds before the first breach that rank: 0 if the controller ended it.
 

@@ -17,15 +17,16 @@ from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.breach_log import EntryMargins
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, Pending, accused, order
+from dubins_traffic.scoring.clean import is_clean
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven
-from dubins_traffic.scoring.duration import counted_rounds, early_rounds, planned_ticks, ran_whole
+from dubins_traffic.scoring.duration import early_rounds, planned_ticks, ran_whole
 from dubins_traffic.scoring.goals import GoalVisits, Visits, rounds_with_share
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE, weight_of
 from dubins_traffic.scoring.margins import entries_by_rule, margins_by_rule
 from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginRules, MarginTables, find_margins
 from dubins_traffic.scoring.paper import paper_score
-from dubins_traffic.scoring.score import Score, is_clean
+from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.tally_tables import GoalCounts, Tally, TrialCounts
 from dubins_traffic.scoring.verdict import reach_verdict
 
@@ -104,7 +105,7 @@ class BatchScores:
                 whole=whole,
                 by_controller=ending.by_controller,
             )
-        clean = is_clean(verdict, collisions, ending)
+        clean = is_clean(verdict, collisions, whole=whole)
         early = rounds_with_share(own.early_rounds, own.early_goals, len(goals))
         driven = _driven(own, rate, ticks)
         return Score(
@@ -115,7 +116,7 @@ class BatchScores:
             record=None,
             duration_s=ticks / rate,
             rounds=visits.rounds,
-            counted_rounds=counted_rounds(visits.rounds, clean=clean, whole=whole),
+            counted_rounds=visits.rounds if clean else 0,
             rounds_before_breach=early_rounds(early, ending),
             goals_visited=visits.visited,
             goals=visits.goals,

@@ -18,10 +18,11 @@ from dubins_traffic.record.sink import BY_CONTROLLER, Ending
 from dubins_traffic.record.wall import Wall
 from dubins_traffic.scoring import registry
 from dubins_traffic.scoring.blocks import joined
+from dubins_traffic.scoring.clean import is_clean
 from dubins_traffic.scoring.clearance import Clearance
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven, Driving
-from dubins_traffic.scoring.duration import counted_rounds, early_rounds, ran_whole
+from dubins_traffic.scoring.duration import early_rounds, ran_whole
 from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
 from dubins_traffic.scoring.goals import GoalVisits, Visiting
 from dubins_traffic.scoring.icra2016 import Icra2016
@@ -226,7 +227,7 @@ class Scorer:
         visits, verdict = self._visiting.result(), self._judging.result()
         collisions, driven = self._collisions.result(), self._driving.result()
         whole = ran_whole(self._instance, self._ending, self._count - 1)
-        clean = is_clean(verdict, collisions, self._ending)
+        clean = is_clean(verdict, collisions, whole=whole)
         broken = first_breach(verdict, collisions)
         return Score(
             trial=self._instance.trial,
@@ -236,7 +237,7 @@ class Scorer:
             record=None if record is None else str(record),
             duration_s=max(0, self._count - 1) / self._instance.problem.rate,
             rounds=visits.rounds,
-            counted_rounds=counted_rounds(visits.rounds, clean=clean, whole=whole),
+            counted_rounds=visits.rounds if clean else 0,
             rounds_before_breach=early_rounds(self._visiting.rounds_until(broken), self._ending),
             goals_visited=visits.visited,
             goals=visits.goals,
@@ -289,6 +290,11 @@ class ScoreSheet(Pictured, Tabulated):
         return sum(score.end in BY_CONTROLLER for score in self.trials)
 
     @property
+    def cut(self) -> int:
+        """Number of trials that others or the user ended before the ego broke anything: neither clean nor not."""
+        return sum(score.verdict is not None and score.verdict.cut for score in self.trials)
+
+    @property
     def counted_rounds_sum(self) -> int:
         """Sum of the rounds of all clean trials that ran their whole durations."""
         return sum(score.counted_rounds for score in self.trials)
@@ -315,6 +321,7 @@ class ScoreSheet(Pictured, Tabulated):
         return {
             "trials": [score.to_json() for score in self.trials],
             "ended_by_controller": self.ended_by_controller,
+            "cut": self.cut,
             "counted_rounds_sum": self.counted_rounds_sum,
             "paper_sum": self.paper_sum,
             "icra2016_sum": self.icra2016_sum,
@@ -326,13 +333,6 @@ def outcome(verdict: str | None, end: str | None) -> str:
     if verdict is None or (verdict == Ruling.UNFINISHED and end in BY_CONTROLLER):
         return str(end or "cut off")
     return str(verdict)
-
-
-def is_clean(verdict: Verdict | None, collisions: Sequence[Collision], ending: Ending | None) -> bool:
-    """Tell whether a trial is clean; if it is not judged, whether the ego touched nothing and did not end it."""
-    if verdict is not None:
-        return verdict.clean
-    return not collisions and not (ending is not None and ending.by_controller)
 
 
 def score(record: Record, metrics: Sequence[MetricSpec] = ()) -> Score:

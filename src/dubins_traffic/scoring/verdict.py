@@ -121,7 +121,9 @@ class Verdict:
     verdict : Ruling
         Satisfied, violated, excused or unfinished.
     clean : bool
-        Whether the ego broke nothing, whatever others did, and its controller did not end the trial.
+        Whether the ego broke nothing in the whole planned duration, whatever others did.
+    cut : bool
+        Whether the ego had broken nothing when others or the user ended the trial: it is neither clean nor not.
     excuse : Excuse or None
         The excuse of an excused trial.
     near : bool or None
@@ -142,6 +144,7 @@ class Verdict:
 
     verdict: Ruling
     clean: bool
+    cut: bool
     excuse: Excuse | None
     near: bool | None
     violations: tuple[Violation, ...]
@@ -175,6 +178,7 @@ class Verdict:
         """Return the verdict as a JSON object."""
         return {
             "clean": self.clean,
+            "cut": self.cut,
             "verdict": self.verdict.value,
             "near": self.near,
             "assumption_broken": self.assumption_broken,
@@ -229,7 +233,7 @@ def reach_verdict(
     whole
         Whether the trial ran its whole planned duration.
     by_controller
-        Whether the ego's controller ended the trial: then it is not clean.
+        Whether the ego's controller ended the trial: then it is not cut.
     """
     from dubins_traffic.routing.rounds import round_time  # compiles; only where there is something to judge
 
@@ -253,7 +257,8 @@ def reach_verdict(
         near = is_near(breaches, back, seen)
     return Verdict(
         ruling,
-        not own and not by_controller,
+        not own and whole,
+        not own and not whole and not by_controller,
         excuse,
         near,
         violations,

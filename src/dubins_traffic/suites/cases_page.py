@@ -9,6 +9,7 @@ from dubins_traffic.campaign.report.markup import base_style, document, section,
 from dubins_traffic.campaign.report.statistics import share
 from dubins_traffic.errors import InputError
 from dubins_traffic.record.sink import BY_CONTROLLER, FAULTS
+from dubins_traffic.scoring.clean import told_cut, was_cut
 from dubins_traffic.suites.comparing import Source, check_suite, named_entries
 from dubins_traffic.suites.markdown import markdown_table
 from dubins_traffic.suites.suite import Suite
@@ -77,6 +78,7 @@ def _ended(columns: Columns) -> int:
 
 
 def _clean(columns: Columns) -> str:
-    own = share(sum(bool(value) for value in columns["clean"]), len(columns["clean"]))
+    cut = sum(map(was_cut, columns["verdict"], columns["clean"], columns["end"]))
+    own = share(sum(bool(value) for value in columns["clean"]), len(columns["clean"]) - cut)
     low, high = own.interval or (0.0, 1.0)
-    return f"{own.count} of {own.total} [{low:.1%}, {high:.1%}]"
+    return f"{own.count} of {own.total} [{low:.1%}, {high:.1%}]{told_cut(cut)}"

@@ -8,6 +8,7 @@ from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.report.comparison import Comparison, Standing
 from dubins_traffic.campaign.report.metrics import WALL_METRICS, shown
 from dubins_traffic.campaign.report.statistics import Estimate, Share
+from dubins_traffic.scoring.clean import told_cut
 from dubins_traffic.scoring.columns import SCORES, SECOND
 from dubins_traffic.scoring.verdict import Ruling
 from dubins_traffic.suites.suite import Suite
@@ -55,7 +56,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
             shown(_sum(standing.estimates[metric.name])),
             _estimate(standing.estimates[SECOND]),
             *(
-                [_share(standing.clean), *(_share(standing.verdicts.get(name)) for name in verdicts)]
+                [_clean(standing), *(_share(standing.verdicts.get(name)) for name in verdicts)]
                 if judged
                 else []
             ),
@@ -90,6 +91,10 @@ def _milliseconds(seconds: float | None) -> str:
 def _estimate(estimate: Estimate) -> str:
     ends = estimate.mean_interval
     return shown(estimate.mean) + ("" if ends is None else f" [{shown(ends[0])}, {shown(ends[1])}]")
+
+
+def _clean(standing: Standing) -> str:
+    return _share(standing.clean) + told_cut(standing.cut)
 
 
 def _share(share: Share | None) -> str:

@@ -109,6 +109,8 @@ def breach_text(violation: Violation) -> str:
 def verdict_text(verdict: Verdict) -> str:
     """Return in words why a trial has its verdict: what the ego broke first, and what excused it."""
     own = next((one for one in verdict.violations if one.car == EGO_NAME), None)
+    if own is None and verdict.cut:
+        return "The ego broke nothing until the trial was cut short."
     if own is None and not verdict.clean:
         return "The ego broke nothing, but its controller ended the trial."
     if own is None:

@@ -17,6 +17,7 @@ from dubins_traffic.campaign.report.metrics import FAULTS, WALL_METRICS
 from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import BY_CONTROLLER
+from dubins_traffic.scoring.clean import was_cut
 from dubins_traffic.scoring.columns import REPORTED, SECOND
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.metric import Column
@@ -32,11 +33,12 @@ class Standing:
     """What is said of one controller.
 
     `estimates` holds a row a metric, by column; `clean` is the share of clean trials in the judged ones and those that
-    came to nothing, `ended` that of trials that the controller ended (`BY_CONTROLLER`) in all, `near` that of excused
-    trials whose excuses were near; `verdicts` holds the share of each verdict in the judged trials, `ends` that of each
-    end in all, `broken` that of trials in which the ego broke each rule, `fallen` in which others broke each part of
-    the assumption; `faults` counts collisions by who was at fault. `formulas` holds the share of each verdict
-    on each formula of the user's own, by its name, in the trials that carry it.
+    came to nothing, without the `cut` ones (docs/rules.md#cut), `ended` that of trials that the controller ended
+    (`BY_CONTROLLER`) in all, `near` that of excused trials whose excuses were near; `verdicts` holds the share of each
+    verdict in the judged trials, `ends` that of each end in all, `broken` that of trials in which the ego broke each
+    rule, `fallen` in which others broke each part of the assumption; `faults` counts collisions by who was at fault.
+    `formulas` holds the share of each verdict on each formula of the user's own, by its name, in the trials that carry
+    it.
     """
 
     controller: str
@@ -44,6 +46,7 @@ class Standing:
     judged: int
     estimates: Mapping[str, Estimate]
     clean: Share
+    cut: int
     ended: Share
     near: Share
     verdicts: Mapping[str, Share]
@@ -174,6 +177,8 @@ def _standing(
     judged = sum(verdict is not None for verdict in verdicts)
     seen = [verdict.value for verdict in Ruling]
     nothing = sum(ends.count(end) for end in rows.NOTHING)
+    clean: list[bool | None] = own["clean"].to_pylist()
+    cut = sum(map(was_cut, verdicts, clean, ends))
 
     def happened(column: str) -> Share:
         return share(int((_floats(own[column]) > 0).sum()), judged)
@@ -183,7 +188,8 @@ def _standing(
         len(own),
         judged,
         {metric.name: estimate(values[metric.name][chosen]) for metric in metrics},
-        share(int((_floats(own["clean"]) > 0).sum()), judged + nothing if judged else 0),
+        share(clean.count(True), judged - cut + nothing if judged else 0),
+        cut,
         share(sum(ends.count(end) for end in BY_CONTROLLER), len(ends)),
         share(int((_floats(own["near"]) > 0).sum()), verdicts.count(Ruling.EXCUSED.value)),
         {verdict: share(verdicts.count(verdict), judged) for verdict in seen} if judged else {},

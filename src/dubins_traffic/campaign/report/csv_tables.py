@@ -7,7 +7,7 @@ import io
 from collections.abc import Iterator, Sequence
 
 from dubins_traffic.campaign.report.comparison import Comparison
-from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share
+from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share, share
 
 ESTIMATE = ("count", "mean", "mean_low", "mean_high", "median", "median_low", "median_high")
 SHARE = ("count", "of", "share", "low", "high")
@@ -40,14 +40,15 @@ def _shares(comparison: Comparison) -> Iterator[Sequence[object]]:
             "clean": {"clean": standing.clean} if standing.judged else {},
             "verdict": standing.verdicts,
             "excused": {"near": standing.near} if standing.near.total else {},
+            "cut": {"cut": share(standing.cut, standing.judged)} if standing.cut else {},
             "end": standing.ends,
             "rule broken by the ego": standing.broken,
             "assumption broken by others": standing.fallen,
             **{f"formula {name}": found for name, found in standing.formulas.items()},
         }
         for what, group in groups.items():
-            for which, share in group.items():
-                yield standing.controller, what, which, *_share(share)
+            for which, part in group.items():
+                yield standing.controller, what, which, *_share(part)
 
 
 def _differences(comparison: Comparison) -> Iterator[Sequence[object]]:

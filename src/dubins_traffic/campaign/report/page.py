@@ -13,6 +13,7 @@ from dubins_traffic.campaign.report.metrics import shown, words
 from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share
 from dubins_traffic.campaign.report.worst import Bad
 from dubins_traffic.rules.clauses import clause
+from dubins_traffic.scoring.clean import told_cut
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.notice import assumption_notice
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
@@ -94,7 +95,7 @@ def _overview(comparison: Comparison) -> str:
         [
             _name(standing, k),
             _count(standing.judged),
-            _share(standing.clean),
+            _share(standing.clean) + told_cut(standing.cut),
             _mean(standing, "counted_rounds"),
             *(_share(standing.verdicts.get(verdict)) for verdict in plots.VERDICTS),
         ]

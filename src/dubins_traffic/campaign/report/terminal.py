@@ -76,6 +76,8 @@ def _shares(comparison: Comparison) -> Table:
         ended = {"ended by the controller": standing.ended} if standing.ended.count else {}
         for name, share in {**judged, **standing.verdicts, **near, **ended, **standing.ends}.items():
             table.add_row(words(name), standing.controller, str(share.count), *_share(share))
+        if standing.cut:
+            table.add_row("cut", standing.controller, str(standing.cut), "", "")
         for who, count in standing.faults.items():
             table.add_row(f"fault of {who}", standing.controller, str(count), "", "")
         for name, found in standing.formulas.items():
