@@ -163,7 +163,9 @@ print(companion.SESSION.read_bytes().split()[-1].decode())
 """
 
 
-@pytest.mark.skipif(not companion.SESSION.exists(), reason="this Linux does not share processors among sessions")
+@pytest.mark.skipif(
+    not companion.SESSION.exists(), reason="this Linux does not share processors among sessions"
+)
 def test_a_companion_stands_back_though_linux_hears_it_only_later(cache) -> None:
     assert python(cache, HEARD_LATER) == (f"{companion.NICE}\n", "")
 
