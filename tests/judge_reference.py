@@ -32,29 +32,59 @@ class Judge:
             for n, facts in enumerate(frame):
                 facts["leaves"], facts["shared"] = self.may_leave(k, n), self.shared(k, n)
                 facts["exit"] = facts["leaves"] and not facts["shared"]
-                facts["way"], facts["stays"] = self.way(k, n), False
-        for n in self.cars:
-            self.note_stays(n)
+                facts["way"] = self.way(k, n)
+        self.owed = {n: self.stays_of(n) | self.journeys_of(n) for n in self.cars}
 
     def note(self, car: Car) -> dict[str, Any]:
         toward = -1 if car.lane is None else self.reference.toward(car.lane)
         return {
             **car.facts, "toward": toward, "ticket": car.ticket, "forfeits": car.forfeits,
             "spot": car.pose[:2],
+            "reaches": [self.reference.lateral_range((car.facts["segment"], way), car) for way in (0, 1)],
             "progress": 0.0 if car.lane is None else self.reference.s(car),
             "left_by": self.reference.lateral_range(car.lane, car)[1] if car.lane else 0.0,
         }  # fmt: skip
 
-    def note_stays(self, n: int) -> None:
-        """E4: note the frames in which a car has been in a disc with a free exit for longer than it may."""
+    def stays_of(self, n: int) -> Found:
+        """E4: the breaches of a car, at most one a stay; also note the frames in which it has stayed for too long."""
+        found: Found = set()
+        wait = self.ticks(self.rules.exit_time)
         for v in range(len(self.reference.points)):
-            for run in self.runs(
-                lambda k, v=v: self.past[k][n]["leaves"] and self.past[k][n]["crosses"] == v
-            ):
-                spent = 0
-                for k in run:
-                    spent += k > run.start and not self.past[k][n]["shared"]
-                    self.past[k][n]["stays"] = spent >= self.ticks(self.rules.exit_time)
+            for stay in self.runs(lambda k, v=v: self.past[k][n]["crosses"] == v):
+                spent, over, pauses = 0, False, False
+                for k in stay:
+                    facts = self.past[k][n]
+                    goes_on = k > stay.start and facts["leaves"] and self.past[k - 1][n]["leaves"]
+                    spent += goes_on and not facts["shared"]
+                    pauses |= k > stay.start and spent > 0 and not facts["leaves"]
+                    self.fired["E4 paused"] += facts["leaves"] and facts["shared"]
+                    if facts["leaves"] and spent >= wait and not over:
+                        over = True
+                        found.add(("E4", n, k, stay.start))
+                        self.fired["E4 added up"] += pauses
+                    facts["stays"] = over
+        return found
+
+    def journeys_of(self, n: int) -> Found:
+        """E5: the breaches of a car, at most one a journey; also note the frames in which it is overdue."""
+        found: Found = set()
+        rules, last, begun, spent, over = self.rules, -1, 0, 0, False
+        way = rules.journey_lengths * max(map(self.reference.length, range(len(self.reference.ends))))
+        limit = self.ticks(rules.rest_time + way / self.problem.car.bounds.speed)
+        for k in range(len(self.past)):
+            facts = self.past[k][n]
+            v = facts["crosses"]
+            if v not in (-1, last):
+                last, begun, spent, over = v, k, 0, False
+            elif k > begun:
+                spent += (
+                    k - begun <= self.ticks(rules.journey_start_time) or facts["way" if v < 0 else "exit"]
+                )
+            if spent >= limit and not over:
+                over = True
+                found.add(("E5", n, k, begun))
+            facts["overdue"] = over
+        return found
 
     def arms(self, v: int) -> list[tuple[int, int]]:
         return [(s, ends.index(v)) for s, ends in enumerate(self.reference.ends) if v in ends]
@@ -145,26 +175,37 @@ class Judge:
     def way(self, k: int, n: int) -> bool:
         """E5: whether a car is in a lane with a free way ahead."""
         facts = self.past[k][n]
-        if facts["lane"] < 0 or facts["blocked"]:
+        if facts["lane"] < 0 or (facts["stopped"] and not (facts["first"] and facts["clear"])):
             return False
-        if facts["stopped"] and not (facts["first"] and facts["clear"]):
-            return False
-        reach = self.rules.way_distance
-        for other in self.cars:
-            its = self.past[k][other]
-            waits = its["stands"] or its["lingers"] or its["excused"] or its["stopped"]
-            if its["lane"] == facts["lane"] and waits and 0 < its["progress"] - facts["progress"] <= reach:
-                return False
         lane = divmod(facts["lane"], 2)
-        for obstacle in self.problem.obstacles:
-            side = self.reference.obstacle_range(lane, obstacle, facts["progress"], facts["progress"] + reach)
-            if side is not None and self.reference.narrows(*side):
+        if facts["left"]:
+            hems = 2.0 * self.problem.car.body.reach + self.rules.overtaking_behind
+            if n != 0 and math.dist(facts["spot"], self.past[k][0]["spot"]) <= hems:
+                self.fired["left by the ego"] += 1
                 return False
+        elif self.narrow_ahead(k, n, lane):
+            return False
         v = self.reference.toward(lane)
         begins = self.reference.length(lane[0]) - self.problem.intersection_radius
-        if self.reference.crossing(v) or begins - facts["progress"] > reach:
+        if self.reference.crossing(v) or begins - facts["progress"] > self.rules.way_distance:
             return True
         return self.may_enter(k, n, v, facts["lane"])
+
+    def narrow_ahead(self, k: int, n: int, lane: tuple[int, int]) -> bool:
+        """E5: whether a body or an obstacle narrows the lane of a car before it."""
+        here, reach = self.past[k][n]["progress"], self.rules.way_distance
+        for other in self.cars:
+            its = self.past[k][other]
+            if other == n or its["segment"] != lane[0]:
+                continue
+            ahead = self.reference.coordinates(lane, *its["spot"])[0] - here
+            if 0 < ahead <= reach and self.reference.narrows(*its["reaches"][lane[1]]):
+                return True
+        for obstacle in self.problem.obstacles:
+            side = self.reference.obstacle_range(lane, obstacle, here, here + reach)
+            if side is not None and self.reference.narrows(*side):
+                return True
+        return False
 
     def may_enter(self, k: int, n: int, v: int, lane: int) -> bool:
         """E5: whether an exit of a bend or dead end is free, and neither the ego nor one of the same lane is in it."""
@@ -258,15 +299,7 @@ class Judge:
             "E3.enter", n, rules.enter_time, lambda k: past[k][n]["first"] and past[k][n]["clear"]
         )
         found |= self.tickets(n)
-        for v in range(len(self.reference.points)):
-            found |= self.counted(
-                ("E4", n), rules.exit_time,
-                lambda k, v=v: past[k][n]["leaves"] and past[k][n]["crosses"] == v,
-                lambda k: not past[k][n]["shared"],
-            )  # fmt: skip
-        return found | self.long(
-            "E5", n, rules.rest_time, lambda k: past[k][n]["lingers"] and past[k][n]["way"]
-        )
+        return found | self.owed[n]
 
     def tickets(self, n: int) -> Found:
         """E3: by waits, which begin with a stop and end where the body meets the disc or with the lane state."""

@@ -25,13 +25,14 @@ ROADS = (TURNED_STAR, KITE, GRID, RING)
 BENT = (BENT_RING, SNAKE)
 BODIES = (Car(), Car(body=Rectangle(0.5, 0.26)), Car(body=Rectangle(0.3, 0.3)))
 QUICK = {
-    "left_time": 2.0, "enter_time": 4.0, "exit_time": 1.5, "rest_time": 1.0, "goal_time": 4.0, "linger_time": 2.0,
-    "shared_time": 0.5, "forfeit_time": 1.5,
+    "left_time": 2.0, "enter_time": 4.0, "exit_time": 1.5, "rest_time": 2.0, "journey_lengths": 0.2,
+    "journey_start_time": 0.5, "goal_time": 4.0, "linger_time": 2.0, "shared_time": 0.5, "forfeit_time": 1.5,
 }  # fmt: skip
 
 CLAUSES = {
     "lingers", "nearer", "passes by", "narrow exit", "way back", "same tick", "ego in the bend", "one in the bend",
-    "full bend", "stopped again", "E4 paused", "E6 paused", "E3.enter", "E3.tickets", "E4", "E5", "E6",
+    "full bend", "stopped again", "E4 paused", "E4 added up", "left by the ego",
+    "E6 paused", "E3.enter", "E3.tickets", "E4", "E5", "E6",
 }  # fmt: skip
 """What is to happen in some trial: rules broken, and clauses by which no rule is or time does not count."""
 

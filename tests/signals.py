@@ -37,7 +37,7 @@ _FORMS = {
     r"G !renewed_(\w+)": "E3.tickets",
     r"G \(exit_(\w+) -> F\[.*\] !exit_\1\)": "E4",
     r"G !stays_(\w+)": "E4",
-    r"G \(lingers_(\w+) & way_\1 -> F\[.*\] !\(lingers_\1 & way_\1\)\)": "E5",
+    r"G !overdue_(\w+)": "E5",
     r"G F free(_)(\d+)_(\d+)": "E6",
 }
 """The forms of the task's formulas, and the rules that they say."""

@@ -46,7 +46,7 @@ def test_rules_with_defaults_and_units(capsys):
     for own in catalogue.rules():
         assert own.default == getattr(RuleParameters(), own.name)
         assert len(own.meaning) > 10, own.name
-        counted = re.search(r", (s|m|m/s|rounds|roads|tickets|breaches)$", own.meaning)
+        counted = re.search(r", (s|m|m/s|rounds|lengths|roads|tickets|breaches)$", own.meaning)
         assert (counted is None) == (own.name == "edition" or own.name.startswith("assume_")), own.name
 
 

@@ -109,9 +109,9 @@ def test_what_is_chosen_is_cut_to_what_the_rules_allow() -> None:
     table = empty(1)
     table[0] = (2.0, 0.0, 1e6, 0.5, 1e6, 1e6, 5.0)
     own = cut(table, 0.5, problem)[0]
-    assert own[CHOICE.SPEED] == pytest.approx(0.12)
+    assert own[CHOICE.SPEED] == pytest.approx(problem.car.bounds.speed / 4.0)
     assert own[CHOICE.HOLD] == pytest.approx(8.0)
-    assert own[CHOICE.PAUSE] == pytest.approx(0.8 * 60.0 - 10.0 - 10.0)
+    assert own[CHOICE.PAUSE] == pytest.approx(0.8 * 60.0 - 20.0)
     assert 0.0 < own[CHOICE.DWELL] <= 1.0
     assert own[CHOICE.GAP] == pytest.approx(0.8)
     assert np.isnan(cut(empty(2), 0.5, problem)).all()

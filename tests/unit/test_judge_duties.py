@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import ceil
+
 import pytest
 
 from dubins_traffic.roads.network import RoadNetwork
@@ -210,36 +212,48 @@ def test_e4_from_disc_to_disc_the_time_begins_anew() -> None:
 # E5
 
 
+SOON = {"rest_time": 3.0, "journey_lengths": 0.0, "journey_start_time": 0.0}
+"""A journey has three seconds that count."""
+
+
 @both
-@anybody
-def test_e5_nobody_lingers_for_long_with_a_free_way(roads: RoadNetwork, who: int) -> None:
-    """Lingers at 100, when ten seconds have passed."""
+def test_e5_a_journey_has_a_minute_and_the_time_for_its_way(roads: RoadNetwork) -> None:
     place = on_lane(roads, lanes_out(roads)[1], 2.2, -0.3)
-    other = on_lane(roads, lanes_out(roads)[2], 2.2, -0.3)
 
     def found(frames: int, **rules: float) -> list[tuple[object, ...]]:
-        length = float(roads.lengths[lanes_out(roads)[2] // 2])
-        creeps = [
-            on_lane(roads, lanes_out(roads)[2], 1.3 + k / 800 * (length - 3.2), -0.3) for k in range(frames)
-        ]
-        script = [[place, creep] if who == 0 else [other, place] for creep in creeps]
-        return said(judged(case(roads, 2, linger_distance=0.01, **rules), script))
+        return said(judged(case(roads, 2, **rules), pair(roads, 1, [place] * frames)))
 
-    expected = [("E5", 1, 700, 100)] if who == 1 else []
-    assert found(700) == []
-    assert found(701) == expected
-    assert found(130, rest_time=3.0) == []
-    assert found(131, rest_time=3.0) == ([("E5", 1, 130, 100)] if who == 1 else [])
+    whole = 600 + ceil(10.0 * 4.0 * float(roads.lengths.max()) / 0.7)
+    assert found(whole) == []
+    assert found(whole + 1) == [("E5", 1, whole, 0)]
+    assert found(600, journey_lengths=0.0) == []
+    assert found(700, journey_lengths=0.0) == [("E5", 1, 600, 0)]
 
 
 @both
-@pytest.mark.parametrize(("way", "rules"), [(0.5 - EPS, ["E5"]), (0.5 + EPS, [])])
-def test_e5_who_swings_to_and_fro_lingers(roads: RoadNetwork, way: float, rules: list[str]) -> None:
-    """It swings by 0.25 m, and comes so far in ten seconds."""
-    lane = lanes_out(roads)[1]
-    places = [on_lane(roads, lane, 1.6 + way * k / 100 - 0.25 * (k % 2), -0.3) for k in range(150)]
-    found = said(judged(case(roads, 2, rest_time=3.0), pair(roads, 1, places)))
-    assert [entry[0] for entry in found if entry[1] == 1] == rules
+def test_e5_who_goes_to_and_fro_over_the_edge_of_a_disc_begins_no_journey(roads: RoadNetwork) -> None:
+    """It is in the disc of the bend, and outside, for a second each: time counts in both; another disc ends that."""
+    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
+    one, two = roads.arms(v)
+    places = [after(roads, two, 0.15 if k // 10 % 2 else -0.1) for k in range(40)]
+    rules = {**SOON, "exit_time": 99.0}
+    assert said(judged(case(roads, 2, **rules), pair(roads, 1, places))) == [("E5", 1, 30, 0)]
+    elsewhere = [*places[:25], after(roads, one ^ 1, -0.1), *places[:25]]
+    assert roads.lane_ends(one ^ 1)[0] != v
+    found = [
+        entry
+        for entry in said(judged(case(roads, 2, **rules), pair(roads, 1, elsewhere)))
+        if entry[0] == "E5"
+    ]
+    assert found == []
+
+
+@both
+def test_e5_the_start_of_a_journey_counts_whatever_is_ahead(roads: RoadNetwork) -> None:
+    lane = lanes_in(roads)[0]
+    script = hold(on_lane(roads, lane, 2.4, -0.3), on_lane(roads, lane, 1.2, -0.3), frames=60)
+    assert said(judged(case(roads, 2, **{**SOON, "journey_start_time": 2.0}), script)) == []
+    assert said(judged(case(roads, 2, **{**SOON, "journey_start_time": 3.0}), script)) == [("E5", 1, 30, 0)]
 
 
 @both
@@ -247,12 +261,29 @@ def test_e5_the_way_is_free_beyond_a_metre_and_a_half(roads: RoadNetwork) -> Non
     lane = lanes_in(roads)[0]
 
     def found(ahead: float) -> list[tuple[object, ...]]:
-        script = hold(on_lane(roads, lane, 1.2 + ahead, -0.3), on_lane(roads, lane, 1.2, -0.3), frames=131)
-        return said(judged(case(roads, 2, rest_time=3.0), script))
+        script = hold(on_lane(roads, lane, 1.2 + ahead, -0.3), on_lane(roads, lane, 1.2, -0.3), frames=31)
+        return said(judged(case(roads, 2, **SOON), script))
 
     assert found(1.5 - EPS) == []
     assert found(1.5 + EASED) == []
-    assert found(1.5 + EPS) == [("E5", 1, 130, 100)]
+    assert found(1.5 + EPS) == [("E5", 1, 30, 0)]
+
+
+@both
+def test_e5_of_two_that_meet_time_counts_for_who_is_on_the_left(roads: RoadNetwork) -> None:
+    """The agents 1 and 2 face each other in the lane of 2; unless the ego is near, 1 has to go back."""
+    lane = lanes_in(roads)[0]
+    length = float(roads.lengths[lane // 2])
+    over, meets = on_lane(roads, lane, 1.6, 0.25), on_lane(roads, lane ^ 1, length - 2.6, -0.3)
+
+    def found(ego: tuple[float, ...]) -> list[tuple[object, ...]]:
+        script = [[ego, over, meets] for _ in range(40)]
+        return [entry for entry in said(judged(case(roads, 3, **SOON), script)) if entry[0] == "E5"]
+
+    assert found(on_lane(roads, lanes_in(roads)[1], 1.2, -0.3)) == [("E5", 1, 30, 0)]
+    hems = 2.0 * RHO + 0.8
+    assert found(on_lane(roads, lane, 1.6 - hems + EPS, 0.25)) == []
+    assert found(on_lane(roads, lane, 1.6 - hems - EPS, 0.25)) == [("E5", 1, 30, 0)]
 
 
 @both
@@ -260,14 +291,14 @@ def test_e5_a_bend_is_no_free_way_that_is_full_or_has_the_ego_in_it(roads: RoadN
     v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
     one, two = roads.arms(v)
     waits = before(roads, one ^ 1, 0.4)
-    rules = {"linger_time": 1.0, "rest_time": 1.0, "exit_time": 99.0}
+    rules = {**SOON, "rest_time": 1.0, "exit_time": 99.0}
 
     def found(ego: tuple[float, ...], other: tuple[float, ...], **more: float) -> list[tuple[object, ...]]:
         script = hold(ego, waits, other, frames=22)
         found = said(judged(case(roads, 3, **{**rules, **more}), script))
         return [entry for entry in found if entry[:2] == ("E5", 1)]
 
-    late = [("E5", 1, 20, 10)]
+    late = [("E5", 1, 10, 0)]
     far, beyond = away(roads), after(roads, two, 1.0)
     assert found(far, beyond) == late
     assert found(far, after(roads, two, 0.3)) == []
@@ -287,13 +318,13 @@ def test_e5_who_comes_the_other_way_through_a_bend_closes_no_exit(roads: RoadNet
         before(roads, two ^ 1, 0.3),
         on_lane(roads, two, 0.7, -0.3),
     )
-    rules = {"linger_time": 1.0, "rest_time": 1.0, "exit_time": 99.0}
+    rules = {**SOON, "rest_time": 1.0, "exit_time": 99.0}
 
     def found(start: tuple[float, ...]) -> list[tuple[object, ...]]:
         script = [[away(roads), waits, start if k == 0 else at_two] for k in range(22)]
         return [entry for entry in said(judged(case(roads, 3, **rules), script)) if entry[:2] == ("E5", 1)]
 
-    assert found(by_two) == [("E5", 1, 20, 10)]
+    assert found(by_two) == [("E5", 1, 10, 0)]
     assert found(at_two) == []
 
 
@@ -302,7 +333,7 @@ def test_e5_one_of_the_same_lane_in_the_bend_has_to_leave_it_first(roads: RoadNe
     v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
     one, two = roads.arms(v)
     waits = before(roads, one ^ 1, 0.9)
-    rules = {"linger_time": 1.0, "rest_time": 1.0, "exit_time": 99.0}
+    rules = {**SOON, "rest_time": 1.0, "exit_time": 99.0}
 
     def found(came: int) -> list[tuple[object, ...]]:
         inside = after(roads, two, -EPS, 0.3)
@@ -311,7 +342,7 @@ def test_e5_one_of_the_same_lane_in_the_bend_has_to_leave_it_first(roads: RoadNe
         return [entry for entry in found if entry[:2] == ("E5", 1)]
 
     assert found(one) == []
-    assert found(two) == [("E5", 1, 20, 10)]
+    assert found(two) == [("E5", 1, 10, 0)]
 
 
 @both
@@ -322,7 +353,7 @@ def test_e5_a_queue_is_no_free_way(roads: RoadNetwork) -> None:
     behind = on_lane(roads, lane, length - 2.9, -0.3)
     inside = after(roads, lanes_out(roads)[1], -0.5)
     script = [[inside, waits, behind] for _ in range(80)]
-    assert said(judged(case(roads, 3, rest_time=3.0), script)) == []
+    assert said(judged(case(roads, 3, **SOON), script)) == []
 
 
 # E6

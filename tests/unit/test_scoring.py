@@ -318,7 +318,13 @@ def test_the_sheet_sums_the_scores() -> None:
         scores.append(scorer.result())
     sheet = ScoreSheet(tuple(scores))
     assert sheet.icra2016_sum == 24 * 8
-    sums = {"ended_by_controller": 0, "counted_rounds_sum": 0, "paper_sum": 48.0, "icra2016_sum": 192.0}
+    sums = {
+        "cut": 0,
+        "ended_by_controller": 0,
+        "counted_rounds_sum": 0,
+        "paper_sum": 48.0,
+        "icra2016_sum": 192.0,
+    }
     assert sheet.to_json() == {"trials": [score.to_json() for score in scores], **sums}
     assert ScoreSheet(()).to_json() == {"trials": [], **dict.fromkeys(sums, 0)}
 

@@ -114,13 +114,14 @@ def test_the_assumption() -> None:
     wanted = """
         [] (Y on_road_agent0 -> on_road_agent0)
         && [] (left_agent0 -> overtaking_agent0) && [] (left_agent0 -> <>[0,10] (!left_agent0 || hemmed_agent0))
-        && [] !turned_agent0 && [] (enter_agent0_1_1 -> Y stopped_agent0_1_1) && [] (enter_agent0_1_1 -> Y !ahead_agent0_1_1)
+        && [] !turned_agent0
+        && [] (enter_agent0_1_1 -> Y stopped_agent0_1_1) && [] (enter_agent0_1_1 -> Y !ahead_agent0_1_1)
         && [] (enter_agent0_1_1 -> Y clear_agent0_1_1)
         && [] !at_fault_agent0
         && [] ((first_agent0_1_1 && clear_agent0_1_1) -> <>[0,10] !(first_agent0_1_1 && clear_agent0_1_1))
         && [] !renewed_agent0
         && [] (exit_agent0 -> <>[0,5] !exit_agent0) && [] !stays_agent0
-        && [] ((lingers_agent0 && way_agent0) -> <>[0,60] !(lingers_agent0 && way_agent0))
+        && [] !overdue_agent0
         && []<> free_0_0
     """
     assert conj(*spec.assumptions) is parse(wanted)
@@ -135,7 +136,7 @@ def test_the_assumption() -> None:
         (2, ("at_fault_",)),
         (3, ("first_", "renewed_")),
         (4, ("exit_", "stays_")),
-        (5, ("lingers_",)),
+        (5, ("overdue_",)),
         (6, ("free_",)),
     ],
 )
@@ -216,8 +217,8 @@ def test_what_a_format_can_not_say_is_named(command: Command, town: str) -> None
     assert "a period of at least 0.25 s" in error
     assert command(town, "--format", "spin", "--guarantee", "--period", "0.25")
     whole = command(town, "--format", "spin", status=2)
-    assert "a period of at least 1.5 s" in whole
-    assert command(town, "--format", "spin", "--period", "1.5")
+    assert "a period of at least 0.25 s" in whole
+    assert command(town, "--format", "spin", "--period", "0.25")
     assert error.startswith(f"dubins-traffic: {town}: --format spin: ")
 
 

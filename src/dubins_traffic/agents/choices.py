@@ -160,11 +160,12 @@ def cut(table: Floats, speed: float, problem: Problem) -> Floats:
     rules = RuleParameters.from_mapping(problem.rules)
     fastest = problem.car.bounds.speed
     own = table.copy()
-    slowest = min(SLOWEST * rules.linger_distance / max(rules.linger_time, problem.period), fastest)
+    crawl = SLOWEST * rules.linger_distance / max(rules.linger_time, problem.period)
+    slowest = min(max(crawl, fastest / max(rules.journey_lengths, 1.0)), fastest)
     own[:, CHOICE.SPEED] = np.clip(own[:, CHOICE.SPEED] * fastest, slowest, fastest)
     hold = rules.enter_time if rules.tickets > 0 else min(rules.enter_time, rules.forfeit_time)
     own[:, CHOICE.HOLD] = np.clip(own[:, CHOICE.HOLD], 0.0, SHARE * hold)
-    rest = SHARE * rules.rest_time - rules.linger_time - hold
+    rest = SHARE * rules.rest_time - rules.journey_start_time
     own[:, CHOICE.PAUSE] = np.clip(own[:, CHOICE.PAUSE], 0.0, max(rest, 0.0))
     through = np.where(np.isfinite(own[:, CHOICE.SPEED]), own[:, CHOICE.SPEED], speed)
     through = np.minimum(np.maximum(through, through_speed(problem)), fastest)

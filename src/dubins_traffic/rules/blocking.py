@@ -7,9 +7,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
+from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.obstacles import ObstacleLanes
+from dubins_traffic.rules.shape import half_extent
 from dubins_traffic.rules.tables import TrialRules
 
 
@@ -26,6 +29,18 @@ class RightLane(NamedTuple):
 def lane_of(t: RoadTable, own: TrialRules, b: int, lane: int) -> RightLane:
     """Return the right lane of `lane` in trial b, whose rules are `own`."""
     return RightLane(b, lane, t.segment[int(t.seg_off[own.net]) + (lane >> 1)].length, own.lane_width)
+
+
+@jit_inline
+def place_in_lane(
+    b: int, k: int, lane: int, state: State, t: RoadTable, own: TrialRules
+) -> tuple[float, float, float]:
+    """Return the progress in `lane` of car `k` (number) of trial b, and the lateral interval of its body, metres."""
+    x, y = state.x[b, k], state.y[b, k]
+    progress, lateral = lane_coordinates(t, own.net, lane, x, y)
+    tx, ty = lane_direction_at(t, own.net, lane, x, y)
+    half = half_extent(tx, ty, state.c[b, k], state.s[b, k], own.half_length, own.half_width, own.rounding)
+    return progress, lateral - half, lateral + half
 
 
 @jit

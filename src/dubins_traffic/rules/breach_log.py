@@ -36,7 +36,7 @@ class _Rule(NamedTuple):
     ENTER: int = 9
     TICKETS: int = 10
     EXIT: int = 11
-    REST: int = 12
+    JOURNEY: int = 12
     GOAL: int = 13
 
 
@@ -82,7 +82,10 @@ class RefereeParameters:
     return_ticks: int
     enter_ticks: int
     exit_ticks: int
-    rest_ticks: int
+    journey_ticks: int
+    """E5's longest journey."""
+    start_ticks: int
+    """So many ticks count at the start of each journey."""
     goal_ticks: int
     shared_ticks: int
     most_tickets: int
@@ -119,12 +122,22 @@ class JudgedCar:
     """Run of being first at a clear crossing."""
     exit_since: int = -1
     """Run of being in a disc with a free exit."""
-    exit_paused: int = -1
+    exit_paused: int = 0
     """Number of ticks of that run that do not count."""
+    exit_spent: int = 0
+    """Number of ticks that count of the earlier such runs in this stay."""
     exit_counts: int = -1
     """That run's first tick while its ticks count, else -1."""
-    rest_since: int = -1
-    """Run of lingering with a free way."""
+    exit_over: int = 0
+    """Whether E4 has been broken in this stay."""
+    journey_since: int = 0
+    """Tick in which the present journey began (E5)."""
+    journey_spent: int = 0
+    """Number of ticks of it that count, those at its start apart."""
+    journey_over: int = 0
+    """Whether E5 has been broken in this journey."""
+    last_disc: int = -1
+    """The disc that the body met last, -1 for none so far."""
     at_since: int = -1
     """Run of being where its centre is: at a vertex or none."""
     in_since: int = -1
@@ -254,7 +267,7 @@ def pack_terms(
     rates: Sequence[float],
     cars: CarTable,
 ) -> Rows[RefereeParameters]:
-    """Return the parameters by which each trial is judged; `goals_begin` and `goals_end` are left to fill in.
+    """Return the parameters by which each trial is judged; those that depend on roads and goals are left to fill in.
 
     Parameters
     ----------
@@ -279,7 +292,7 @@ def pack_terms(
         own.return_ticks = ticks(given.left_time, rate)
         own.enter_ticks = ticks(given.enter_time, rate)
         own.exit_ticks = ticks(given.exit_time, rate)
-        own.rest_ticks = ticks(given.rest_time, rate)
+        own.start_ticks = ticks(given.journey_start_time, rate)
         own.goal_ticks = ticks(given.goal_time, rate)
         own.shared_ticks = ticks(given.shared_time, rate)
         own.most_tickets = given.tickets

@@ -95,6 +95,13 @@ def judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, count: int, ta
 
 
 @jit_inline
+def judge_turn(car: JudgedCar, bits: Any, lane: int, tick: int, log: BreachLog) -> None:
+    """Judge rule 2: a car turns round, or backs up so far, in discs only; `bits` (FLAG) are those in this frame."""
+    if bits & FLAG.TURNED != 0:
+        add(log, car, RULE.TURN, tick, tick, -1, lane)
+
+
+@jit_inline
 def judge_road(car: JudgedCar, on: bool, lane: int, tick: int, log: BreachLog) -> None:
     """Judge rule 1 for the ego, E1 for an e-agent: after its first frame on the road a car stays there.
 

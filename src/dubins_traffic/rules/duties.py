@@ -11,15 +11,12 @@ from dubins_traffic.cars.near import list_near, ticks_within
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.roads.lookup import lane_end
-from dubins_traffic.rules.blocking import lane_of, obstacle_narrows
+from dubins_traffic.rules.blocking import RightLane, lane_of, narrows, obstacle_narrows, place_in_lane
 from dubins_traffic.rules.breach_log import NEVER_DUE, RULE, RefereeTables
 from dubins_traffic.rules.breaches import FIRST_AND_CLEAR, add, at_goal, judge_queue, lasted, run, when_due
 from dubins_traffic.rules.exits import ego_at_exit, find_exit, look_for_exit, way_back
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN
-
-EXCUSES_FOLLOWER = FLAG.STANDS | FLAG.LINGERS | FLAG.EXCUSED | FLAG.STOPPED
-"""Flags of a car behind which another need not go on (E5)."""
 
 
 @jit_inline
@@ -38,17 +35,32 @@ def judge_agent(b: int, n: int, tick: int, tables: RefereeTables) -> int:
     if car.crosses != v or v < 0:
         car.exit_since = -1
         car.exit_counts = -1
+        car.exit_spent = car.exit_over = 0
     due = when_due(tick, car.first_since, terms.enter_ticks)
     if v >= 0:
         due = min(due, _judge_exit(b, n, tick, v, tables))
-    free = bits & FLAG.LINGERS != 0
-    if free:
-        due = tick + 1
-        free = has_way(b, n, tick, tables)
-    car.rest_since = run(free, tick, car.rest_since)
-    if lasted(tick, car.rest_since) == terms.rest_ticks:
-        add(log, car, RULE.REST, tick, car.rest_since, -1, lane)
-    return due
+        if v != car.last_disc:
+            car.last_disc, car.journey_since = v, tick
+            car.journey_spent = car.journey_over = 0
+    return min(due, _judge_journey(b, n, tick, tables))
+
+
+@jit_inline
+def _judge_journey(b: int, n: int, tick: int, tables: RefereeTables) -> int:
+    """Judge E5 for e-agent n of trial b; return the tick in which to judge again if the car's labels stay the same."""
+    log, terms, labels = tables.log, tables.terms[b], tables.labels
+    car = log.car[b, n]
+    start = min(terms.start_ticks, terms.journey_ticks)
+    long = tick - car.journey_since
+    if long < start:
+        return car.journey_since + start
+    if long > start:
+        counts = has_way(b, n, tick, tables) if labels.crosses[b, n] < 0 else car.exit_counts >= 0
+        car.journey_spent += 1 if counts else 0
+    if car.journey_over == 0 and start + car.journey_spent == terms.journey_ticks:
+        car.journey_over = 1
+        add(log, car, RULE.JOURNEY, tick, car.journey_since, -1, labels.lane[b, n])
+    return tick + 1
 
 
 @jit
@@ -67,15 +79,18 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
         shares = ego.in_since == car.in_since
         lately = tick - car.in_since <= terms.shared_ticks
         paused = ego.in_since > car.in_since or (shares and lately)
+    if not free and car.exit_since >= 0:
+        car.exit_spent += tick - 1 - car.exit_since - car.exit_paused
     car.exit_since = run(free, tick, car.exit_since)
     long = lasted(tick, car.exit_since)
     if long <= 0:
         car.exit_paused = 0
     elif paused:
         car.exit_paused += 1
-    ago = terms.exit_ticks + car.exit_paused
-    if long >= 0 and long == ago and (long == 0 or not paused):
-        add(log, car, RULE.EXIT, tick, car.exit_since, v, tables.labels.lane[b, n])
+    ago = terms.exit_ticks - car.exit_spent + car.exit_paused
+    if car.exit_over == 0 and long >= 0 and long == ago and (long == 0 or not paused):
+        car.exit_over = 1
+        add(log, car, RULE.EXIT, tick, car.in_since, v, tables.labels.lane[b, n])
     car.exit_counts = -1 if paused else car.exit_since
     if paused:
         return tick + 1
@@ -89,19 +104,14 @@ def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
     own, terms = tables.rules[b], tables.terms[b]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
-    if (
-        lane < 0
-        or bits & FLAG.BLOCKED != 0
-        or (bits & FLAG.STOPPED != 0 and bits & FIRST_AND_CLEAR != FIRST_AND_CLEAR)
-    ):
+    if lane < 0 or (bits & FLAG.STOPPED != 0 and bits & FIRST_AND_CLEAR != FIRST_AND_CLEAR):
         return False
     here = row[n].progress
-    for k in range(state.count[b]):
-        waits = labels.lane[b, k] == lane and np.int64(labels.bits[b, k]) & EXCUSES_FOLLOWER != 0
-        if waits and 0.0 < row[k].progress - here <= terms.way:
-            return False
     place = lane_of(roads, own, b, lane)
-    if obstacle_narrows(tables.obstacles, place, here, here + terms.way, own.free_needed + GRAIN):
+    if bits & FLAG.LEFT != 0:
+        if _is_by_ego(b, n, tables):
+            return False
+    elif _is_narrow(b, n, place, here, tables):
         return False
     v = lane_end(roads, own.net, lane)
     vertex = int(roads.vert_off[own.net]) + v
@@ -113,6 +123,27 @@ def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
     vx, vy = roads.vertex[vertex].x, roads.vertex[vertex].y
     count = list_near(state, b, tick, vx, vy, terms.lone, tables.spacing)
     return find_exit(b, n, v, way_back(v, lane, roads, own), count, tables)
+
+
+@jit_inline
+def _is_by_ego(b: int, n: int, tables: RefereeTables) -> bool:
+    """Tell whether the ego is so near to car n of trial b that it may hem it in."""
+    state = tables.state
+    dx, dy = state.x[b, EGO] - state.x[b, n], state.y[b, EGO] - state.y[b, n]
+    return n != EGO and dx * dx + dy * dy <= tables.rules[b].hem2
+
+
+@jit_inline
+def _is_narrow(b: int, n: int, place: RightLane, here: float, tables: RefereeTables) -> bool:
+    """Tell whether a body, standing or not, narrows the lane ahead of car n, whose progress is `here` (m)."""
+    own, way = tables.rules[b], tables.terms[b].way
+    for k in range(tables.state.count[b]):
+        if k != n and tables.labels.segment[b, k] == place.lane // 2:
+            progress, low, high = place_in_lane(b, k, place.lane, tables.state, tables.roads, own)
+            near = 0.0 < progress - here <= way
+            if near and narrows(low, high, own.lane_width, own.free_needed + GRAIN):
+                return True
+    return obstacle_narrows(tables.obstacles, place, here, here + way, own.free_needed + GRAIN)
 
 
 @jit

@@ -12,18 +12,13 @@ import numpy as np
 from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import Rows
-from dubins_traffic.roads.lookup import (
-    lane_coordinates,
-    lane_direction_at,
-    lane_end,
-)
-from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
+from dubins_traffic.roads.lookup import lane_end
+from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows, place_in_lane
 from dubins_traffic.rules.hemming import hem_in
 from dubins_traffic.rules.label_cache import check_label_caches, forget_region, relabel_from_cache
 from dubins_traffic.rules.location import locate, moved2, put_in_order
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.queue import Queue, foremost, gather, keep_order
-from dubins_traffic.rules.shape import half_extent
 from dubins_traffic.rules.tables import CarMemory, LabelTables
 
 MOTIONLESS = FLAG.STILL | FLAG.LINGERS
@@ -278,14 +273,9 @@ def _cars_beside(b: int, n: int, lane: int, tables: LabelTables) -> tuple[bool, 
     other = tables.memory.head[b, lane // 2].segment
     while other >= 0:
         if other != n and tables.labels.bits[b, other] & FLAG.STANDS != 0:
-            x, y = state.x[b, other], state.y[b, other]
-            progress, lateral = lane_coordinates(t, own.net, lane, x, y)
-            tx, ty = lane_direction_at(t, own.net, lane, x, y)
-            half = half_extent(
-                tx, ty, state.c[b, other], state.s[b, other], own.half_length, own.half_width, own.rounding
-            )
+            progress, low, high = place_in_lane(b, other, lane, state, t, own)
             ahead = progress - here
-            if narrows(lateral - half, lateral + half, own.lane_width, own.free_needed):
+            if narrows(low, high, own.lane_width, own.free_needed):
                 blocked = blocked or 0.0 < ahead <= own.blocked_ahead
                 beside = beside or -own.overtaking_behind <= ahead <= own.overtaking_ahead
         other = row[other].next_on_segment

@@ -88,11 +88,18 @@ def along_lane(
 
 
 @jit_inline
+def forget_lane(car: CarMemory) -> None:
+    """Forget where in a lane a car was, which has no lane state now."""
+    car.top = car.progress = car.lateral = 0.0
+    car.held_top = NEVER_AGAIN
+
+
+@jit_inline
 def keep_tops(car: CarMemory, fresh: bool, overtakes: bool) -> None:
     """Keep the greatest progress of a car whose progress is known, and the reference by which it would turn.
 
-    `fresh` tells whether its lane state was set or flipped in this frame, `overtakes` whether it overtook in the frame
-    before. The reference is the greatest progress, but does not rise while the car overtakes.
+    `fresh` (bool) tells whether its lane state was set or flipped in this frame, `overtakes` (bool) whether it overtook
+    in the frame before. The reference is the greatest progress, but does not rise while the car overtakes.
     """
     if fresh:
         car.top = car.progress

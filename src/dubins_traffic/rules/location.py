@@ -35,7 +35,7 @@ from dubins_traffic.rules.label_cache import (
     still,
 )
 from dubins_traffic.rules.lane_cache import keep_arm, keep_road
-from dubins_traffic.rules.lane_state import along_lane, keep_tops, lane_here
+from dubins_traffic.rules.lane_state import along_lane, forget_lane, keep_tops, lane_here
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.rules.tables import NEVER_AGAIN, CarMemory, Heads, LabelTables, Memory, TrialRules
@@ -68,19 +68,16 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     lane = -1
     turned = False
     if at >= 0:
-        car.top = car.progress = car.lateral = 0.0
-        car.held_top = NEVER_AGAIN
+        forget_lane(car)
     else:
         lane, fresh = lane_here(t, net, labels.at[b, n], lane_before, segment, off2, pose)
         lane, car.progress, car.lateral, turned = along_lane(
             t, net, lane, fresh, min(car.top, car.held_top), own.turn_back, pose
         )
         keep_tops(car, fresh or turned, before & FLAG.OVERTAKING != 0)
-    bits = _entry_flags(tick, t, own, crosses, crossed, lane_before, before)
+    bits = _entry_flags(tick, t, own, crosses, crossed, lane_before, before) | (FLAG.TURNED if turned else 0)
     if off2 <= half_road * half_road:
         bits |= FLAG.ON_ROAD
-    if turned:
-        bits |= FLAG.TURNED
     if lane != lane_before:
         bits &= ~FLAG.STOPPED
         car.approach_since = -1

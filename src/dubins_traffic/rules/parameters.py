@@ -82,9 +82,13 @@ class RuleParameters:
     shared_time: float = 60.0
     """E4: so long the time does not count in which the ego is in the disc since the same tick as the car."""
     way_distance: float = 1.5
-    """E5: the way is free if nothing that stands, lingers or queues is within this distance, and no full bend."""
+    """E5: the way is free if nothing narrows the lane within this distance, and no full bend is within it."""
     rest_time: float = 60.0
-    """E5: with a free way nobody lingers longer than this."""
+    """E5: what a journey may take, beside the time for its way."""
+    journey_lengths: float = 4.0
+    """E5: the time for its way is that in which a car at top speed drives so many times the longest segment."""
+    journey_start_time: float = 20.0
+    """E5: this time counts at the start of a journey whatever is ahead; later, time with a free way."""
     goal_time: float = 60.0
     """E6: every goal is free again within this time."""
     goal_gap: float = 0.8

@@ -35,13 +35,12 @@ from dubins_traffic.rules.judged import JudgedInstance, JudgedProblem, distinct_
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee_kernel import judge_frame, judge_frames
-from dubins_traffic.rules.tables import spread
+from dubins_traffic.rules.tables import spread, ticks
 
 _PENDING = (
     ("2.return", "free_since"),
     ("E3.enter", "first_since"),
     ("E4", "exit_counts"),
-    ("E5", "rest_since"),
 )
 """Rules that a car breaks if nothing changes for long enough, and the field of `JudgedCar` whose run tells so."""
 _ROOMY = 64
@@ -181,8 +180,12 @@ class Referee:
     @property
     def stays(self) -> npt.NDArray[np.bool_]:
         """Which e-agents have been in a disc with a free exit for longer than they may (E4), (B, N)."""
-        since, paused = self._log.car["exit_since"], self._log.car["exit_paused"]
-        return (since >= 0) & (self._tick - since - paused >= self._terms["exit_ticks"][:, None])
+        return self._log.car["exit_over"] != 0
+
+    @property
+    def overdue(self) -> npt.NDArray[np.bool_]:
+        """Which e-agents are on a journey that has taken longer than it may (E5), (B, N)."""
+        return self._log.car["journey_over"] != 0
 
     def ways(self, state: State) -> npt.NDArray[np.bool_]:
         """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, that of `state`."""
@@ -268,9 +271,18 @@ def terms_of(problems: Sequence[JudgedProblem]) -> tuple[Rows[RefereeParameters]
     for problem in problems:
         goals += dict.fromkeys(problem.goal_vertices) if problem.rules else ()
         ends.append(len(goals))
+    terms["journey_ticks"][:] = [
+        _journey_ticks(problem, RuleParameters.from_mapping(problem.rules)) for problem in problems
+    ]
     terms["goals_begin"][:] = ends[:-1]
     terms["goals_end"][:] = ends[1:]
     return terms, np.array(goals, dtype=np.int64)
+
+
+def _journey_ticks(problem: JudgedProblem, given: RuleParameters) -> int:
+    """Return the longest journey of an e-agent, ticks (docs/rules.md#E5)."""
+    way = given.journey_lengths * float(problem.network.lengths.max())
+    return ticks(given.rest_time + way / problem.car.bounds.speed, problem.rate)
 
 
 def pending_of(trials: Ints, terms: Rows[RefereeParameters], breach_log: BreachLog) -> list[Pending]:

@@ -19,7 +19,7 @@ i stands for the name of a car, x and y for a lattice point. All mean what docs/
 ``renewed_i``                         i gets one more new ticket in one wait than E3 allows
 ``exit_i``                            the body meets a disc out of which some exit is free, and the time counts (E4)
 ``stays_i``                           it has done so for longer than it may, times that do not count left out (E4)
-``lingers_i`` ``way_i``               i lingers; i is in a lane with a free way ahead (E5)
+``overdue_i``                         its journey has taken longer than it may (E5)
 ``excess_i``                          i has broken E1 more often than the exceptions allow (only if there are any)
 ====================================  =============================================================================
 
@@ -131,7 +131,7 @@ def _assumed(name: str, crossings: Sequence[Point], rules: RuleParameters) -> li
         found.append(_no_longer(prop(f"exit_{name}"), rules.exit_time))
         found.append(always(negation(prop(f"stays_{name}"))))
     if rules.assume_e5:
-        found.append(_no_longer(conj(prop(f"lingers_{name}"), prop(f"way_{name}")), rules.rest_time))
+        found.append(always(negation(prop(f"overdue_{name}"))))
     return found
 
 

@@ -44,6 +44,7 @@ class _Scene(NamedTuple):
     may_leave: Mask
     stays: Mask
     ways: Mask
+    overdue: Mask
     renewed: Mask
     excess: Mask
 
@@ -66,6 +67,7 @@ class _Scene(NamedTuple):
             may_leave=masks(),
             stays=masks(),
             ways=masks(),
+            overdue=masks(),
             renewed=masks(),
             excess=masks(),
         )
@@ -158,6 +160,7 @@ class Valuation:
             breaches = self._referee.update(tick, self._state, [contacts])[0]
         scene.may_leave[row] = self._referee.may_leave[0]
         scene.stays[row] = self._referee.stays[0]
+        scene.overdue[row] = self._referee.overdue[0]
         if self._asks_for_ways:
             scene.ways[row] = self._referee.ways(self._state)[0]
         over = self._labeller.forfeits[0] == self._rules.tickets + 1
@@ -176,7 +179,13 @@ class Valuation:
             flag = scene.bits[:, car] & NAMES[word] != 0
             return flag if place < 0 else flag & (self._ends[scene.lane[:, car]] == place)
         masks = {"collision": scene.touches, "at_fault": scene.guilty, "exit": scene.may_leave}
-        masks |= {"stays": scene.stays, "way": scene.ways, "renewed": scene.renewed, "excess": scene.excess}
+        masks |= {
+            "stays": scene.stays,
+            "way": scene.ways,
+            "overdue": scene.overdue,
+            "renewed": scene.renewed,
+            "excess": scene.excess,
+        }
         if word in masks:
             return masks[word][:, car]
         return {AT: scene.at, SEGMENT: scene.segment, LANE: scene.lane}[word][:, car] == place

@@ -15,8 +15,8 @@ i stands for the name of a car, x and y for a lattice point. Beside those of the
 ``visit_i_x_y``               a visit begins: the centre comes into the disc, for the first time or from another one
 ============================  ======================================================================================
 
-``exit``, ``stays``, ``way``, ``renewed`` and ``excess`` are there if the problem asks for the rules; all but ``way``
-only of e-agents.
+``exit``, ``stays``, ``way`` (in a lane with a free way ahead, E5), ``overdue``, ``renewed`` and ``excess`` are there if
+the problem asks for the rules; all but ``way`` only of e-agents.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import NAMES
 
 OF_CAR: Final = (*NAMES, "collision", "at_fault")
-OF_JUDGED: Final = ("way", "exit", "stays", "renewed", "excess")
+OF_JUDGED: Final = ("way", "exit", "stays", "overdue", "renewed", "excess")
 """Propositions of problems that are judged by the rules only."""
 OF_INTERSECTION: Final = ("cross", "enter", "clear", "visit")
 OF_CROSSING: Final = ("approach", "stopped", "ahead", "first", "forfeited")

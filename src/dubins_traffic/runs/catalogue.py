@@ -32,6 +32,7 @@ UNITS: Final = {
     "_time": "s",
     "_speed": "m/s",
     "_rounds": "rounds",
+    "_lengths": "lengths",
     "_degree": "roads",
     "tickets": "tickets",
     "exceptions": "breaches",

@@ -26,7 +26,7 @@ RULES = {
     "E3.enter": "is first at a clear crossing and does not enter",
     "E3.tickets": "loses its place in the order",
     "E4": "stays in a disc with a free exit",
-    "E5": "lingers with a free way ahead",
+    "E5": "takes too long from one intersection to another",
     "E6": "keeps a goal taken",
 }
 """What a car does that breaks a rule, in words."""
