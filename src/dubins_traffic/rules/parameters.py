@@ -76,7 +76,7 @@ class RuleParameters:
     tickets: int = 1
     """E3: most new tickets in one wait, from the first stop in a lane state to the disc or the lane state's end."""
     exit_gap: float = 0.8
-    """E4: an exit is free if no centre is in its lane within this distance of the disc."""
+    """E4: an exit is free if no centre is in its lane within this distance of the disc; long bodies ask for more."""
     exit_time: float = 5.0
     """E4: a disc with a free exit is left within this time."""
     shared_time: float = 60.0
@@ -145,6 +145,14 @@ class RuleParameters:
         values = tuple(rules.values())
         types = tuple(map(type, values))
         return _checked(tuple(rules), values, types) if _NUMBERS.issuperset(types) else _made(rules)
+
+    def room_beyond(self, reach: float, bodies: int) -> float:
+        """Return how far beyond a disc an exit has to be empty to be free (docs/rules.md#free-exit), metres.
+
+        `reach` (m) is a body's farthest point. In that distance there is room for `bodies` half bodies, one after
+        another: 2 where nothing else may be, 3 where no other centre may be.
+        """
+        return max(self.exit_gap, bodies * reach + 0.25 * self.exit_gap)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return all parameters by name, in the order of their definition."""
