@@ -159,7 +159,13 @@ def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
     while j >= 0:
         along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
         half = half_extent(
-            tx, ty, state.c[b, j], state.s[b, j], vehicle.half_length, vehicle.half_width, vehicle.rounding
+            tx,
+            ty,
+            float(state.c[b, j]),
+            float(state.s[b, j]),
+            vehicle.half_length,
+            vehicle.half_width,
+            vehicle.rounding,
         )
         takes = aside <= 0.0 and traffic.labels.lane[b, j] != out ^ 1
         takes = takes or narrows(aside - half, aside + half, 2.0 * vehicle.middle, vehicle.needed)
