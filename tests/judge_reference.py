@@ -271,6 +271,7 @@ class Judge:
         alone = self.runs(lambda k: past[k][n]["left"] and not past[k][n]["overtaking"])
         since = {run.start: next(long.start for long in left if run.start in long) for run in alone}
         found = {("2.left", n, tick, begin) for tick, begin in since.items()}
+        found |= {("2.turn", n, k, k) for k, frame in enumerate(past) if frame[n]["turned"]}
         return found | self.long(
             "2.return",
             n,

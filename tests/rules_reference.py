@@ -22,7 +22,8 @@ class Car:
     ways: list[float] = field(default_factory=list)
     pose: tuple[float, float, float, float] = (0.0, 0.0, 1.0, 0.0)
     lane: tuple[int, int] | None = None
-    top: float = 0.0
+    backs_from: float = 0.0
+    """Progress from which backing is measured."""
     at: int = -1
     crosses: int = -1
     approaches: list[int] = field(default_factory=list)
@@ -182,12 +183,13 @@ class Reference:
             elif car.lane is None or (offs[car.lane[0]] > self.w2 >= offs[nearest]):
                 new = self.by_heading(nearest, car)
             if new is not None:
-                car.lane, car.top = new, -math.inf
+                car.lane, car.backs_from = new, -math.inf
             s, _ = self.coordinates(car.lane, x, y)
-            car.top = max(car.top, s)
-            if car.top - s >= self.rules["turn_back"]:
+            if new is not None or not before.get("overtaking"):
+                car.backs_from = max(car.backs_from, s)
+            if car.backs_from - s >= self.rules["turn_back"]:
                 car.lane, turned = (car.lane[0], 1 - car.lane[1]), True
-                car.top = self.coordinates(car.lane, x, y)[0]
+                car.backs_from = self.coordinates(car.lane, x, y)[0]
         entered = self.tick > 0 and car.crosses >= 0 and car.crosses != crossed
         if car.crosses < 0 or car.crosses != crossed:
             car.breach3 = False

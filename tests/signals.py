@@ -27,6 +27,7 @@ _FORMS = {
     r"G F visit_(\w+)_(\d+)_(\d+)": "1.goal",
     r"G \(left_(\w+) -> overtaking_\1\)": "2.left",
     r"G \(left_(\w+) -> F\[.*\] \(!left_\1 \| hemmed_\1\)\)": "2.return",
+    r"G !turned_(\w+)": "2.turn",
     r"G \(enter_(\w+)_(\d+)_(\d+) -> Y stopped_\1_\2_\3\)": "3.stop",
     r"G \(enter_(\w+)_(\d+)_(\d+) -> Y !ahead_\1_\2_\3\)": "3.order",
     r"G \(enter_(\w+)_(\d+)_(\d+) -> Y clear_\1_\2_\3\)": "3.clear",

@@ -162,9 +162,24 @@ def test_what_stands_too_far_ahead_is_no_reason(roads: RoadNetwork, who: int) ->
 @anybody
 def test_turning_round_on_the_road_breaks_rule_2(roads: RoadNetwork, who: int) -> None:
     lane = lanes_in(roads)[0]
-    for back, expected in ((0.3 - EPS, []), (0.3 + EPS, [("2.left", who, 2, 2)])):
+    for back, expected in ((0.3 - EPS, []), (0.3 + EPS, [("2.left", who, 2, 2), ("2.turn", who, 2, 2)])):
         places = [on_lane(roads, lane, s, -0.3) for s in (2.0, 2.5, 2.5 - back)]
         assert said(judged(case(roads, 2), pair(roads, who, places))) == expected
+
+
+@both
+@anybody
+@pytest.mark.parametrize(("back", "turns"), [(0.3 - EPS, False), (0.3 + EPS, True)])
+def test_who_backs_out_of_overtaking_turns_only_behind_where_that_began(
+    roads: RoadNetwork, who: int, back: float, turns: bool
+) -> None:
+    lane = lanes_in(roads)[0]
+    stands = on_lane(roads, lane, 2.6, -0.3)
+    ways = [1.5] * 11 + [1.5 + 0.05 * k for k in range(1, 25)] + [2.7 - 0.05 * k for k in range(1, 24)]
+    mine = [on_lane(roads, lane, s, -0.3 if s < 1.55 else 0.1) for s in (*ways, 1.5 - back, 1.6)]
+    script = [[place, stands] if who == 0 else [stands, place] for place in mine]
+    found = [rule for rule, *_ in said(judged(case(roads, 2, left_time=60.0), script))]
+    assert ("2.turn" in found) == turns
 
 
 @both

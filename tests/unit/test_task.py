@@ -101,7 +101,7 @@ def test_the_rules_of_the_ego() -> None:
     wanted = """
         [] !collision_ego && [] (Y on_road_ego -> on_road_ego) && []<> visit_ego_2_2
         && [] (left_ego -> overtaking_ego) && [] (left_ego -> <>[0,7.5] (!left_ego || hemmed_ego))
-        && [] (enter_ego_1_1 -> Y stopped_ego_1_1) && [] (enter_ego_1_1 -> Y !ahead_ego_1_1)
+        && [] !turned_ego && [] (enter_ego_1_1 -> Y stopped_ego_1_1) && [] (enter_ego_1_1 -> Y !ahead_ego_1_1)
         && [] (enter_ego_1_1 -> Y clear_ego_1_1)
     """
     assert conj(*spec.guarantees) is parse(wanted)
@@ -114,7 +114,7 @@ def test_the_assumption() -> None:
     wanted = """
         [] (Y on_road_agent0 -> on_road_agent0)
         && [] (left_agent0 -> overtaking_agent0) && [] (left_agent0 -> <>[0,10] (!left_agent0 || hemmed_agent0))
-        && [] (enter_agent0_1_1 -> Y stopped_agent0_1_1) && [] (enter_agent0_1_1 -> Y !ahead_agent0_1_1)
+        && [] !turned_agent0 && [] (enter_agent0_1_1 -> Y stopped_agent0_1_1) && [] (enter_agent0_1_1 -> Y !ahead_agent0_1_1)
         && [] (enter_agent0_1_1 -> Y clear_agent0_1_1)
         && [] !at_fault_agent0
         && [] ((first_agent0_1_1 && clear_agent0_1_1) -> <>[0,10] !(first_agent0_1_1 && clear_agent0_1_1))
@@ -131,7 +131,7 @@ def test_the_assumption() -> None:
 @pytest.mark.parametrize(
     ("number", "words"),
     [
-        (1, ("on_road_", "left_", "enter_")),
+        (1, ("on_road_", "left_", "turned_", "enter_")),
         (2, ("at_fault_",)),
         (3, ("first_", "renewed_")),
         (4, ("exit_", "stays_")),
@@ -192,7 +192,7 @@ def test_the_rules_in_every_format(
 def test_a_huge_network_takes_seconds() -> None:
     """Four times the intersections take about four times as long to write."""
     quarter, spec = (of(case(RoadNetwork.grid(n, n, 5.0), 2, [(n - 1, n - 1)])) for n in (15, 30))
-    assert len(spec.guarantees) == 5 + 3 * (900 - 4)
+    assert len(spec.guarantees) == 6 + 3 * (900 - 4)
     for name, write in FORMATS.items():
         began = process_time()
         write(quarter, 20.0)

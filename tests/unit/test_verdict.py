@@ -99,8 +99,10 @@ def test_a_trial_that_its_controller_ended_is_never_clean(end: End) -> None:
     cars = left_at(roads, one, 40), left_at(roads, two, 40)
     found = verdict(case(roads, 2), [list(frame) for frame in zip(*cars, strict=True)], end=end)
     assert found.violations == ()
-    assert found.clean == (end.value not in CONTROLLERS_OWN)
-    assert (owner_of(end) == "submission") == (not found.clean or end in (End.DURATION, End.COLLISION))
+    by_controller = end.value in CONTROLLERS_OWN
+    assert found.clean == (end == End.DURATION)
+    assert found.cut == (not by_controller and end != End.DURATION)
+    assert (owner_of(end) == "submission") == (by_controller or end in (End.DURATION, End.COLLISION))
 
 
 class Raises:
@@ -331,7 +333,7 @@ def test_formulas_have_four_values() -> None:
     waits = [[on_lane(GRID, lanes_out(GRID)[0], 2.0, -0.3), before(GRID, lanes_in(GRID)[1], 0.3)]] * 10
     assert verdict(case(GRID, 2), waits).formulas["E3"] == "presumably false"
     assert set(late) == {
-        "1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.clear",
+        "1.collision", "1.road", "2.left", "2.return", "2.turn", "3.stop", "3.order", "3.clear",
         "E1", "E2", "E3", "E4", "E5", "E6",
     }  # fmt: skip
 
@@ -431,13 +433,13 @@ def test_check_prints_the_verdict(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert main(["check", str(judged), str(silent), "--json"]) == 0
     first, second = json.loads(capsys.readouterr().out)["records"]
     keys = [
-        "record", "end", "clean", "verdict", "near", "violations", "rounds", "counted_rounds", "longest_gap_s",
+        "record", "end", "clean", "cut", "verdict", "near", "violations", "rounds", "counted_rounds", "longest_gap_s",
     ]  # fmt: skip
     assert list(first) == keys
     assert (first["record"], first["clean"]) == (str(judged), False)
     assert first["verdict"] in ("violated", "excused")
     assert list(first["violations"][0]) == ["rule", "car", "time", "since", "where"]
-    assert [second[key] for key in keys[2:6]] == [None, None, None, []]
+    assert [second[key] for key in keys[2:7]] == [None, None, None, None, []]
     assert main(["check", str(judged), str(silent)]) == 0
     text = capsys.readouterr().out
     assert first["verdict"] in text

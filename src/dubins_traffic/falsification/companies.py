@@ -23,7 +23,7 @@ from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginTables, find
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
-COLUMNS: Final = {"1.road": "road", "2.left": "line", "2.return": "back"}
+COLUMNS: Final = {"1.road": "road", "2.left": "line", "2.return": "back", "2.turn": "turn"}
 ENTRIES: Final = {"3.stop": "stop", "3.order": "order", "3.clear": "clear"}
 MEASURED: Final = ("1.collision", *COLUMNS, *ENTRIES)
 """The rules whose margins can be watched while a trial runs."""

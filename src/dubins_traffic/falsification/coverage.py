@@ -22,6 +22,7 @@ ALONG: Final = {
     "1.road": (Manoeuvre.DRIVING, Manoeuvre.OVERTAKING),
     "2.left": (Manoeuvre.OVERTAKING,),
     "2.return": (Manoeuvre.OVERTAKING,),
+    "2.turn": (Manoeuvre.DRIVING, Manoeuvre.OVERTAKING),
 }
 """What an ego does on a road when it may break a rule; of other rules nothing is expected."""
 

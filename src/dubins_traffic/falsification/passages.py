@@ -106,6 +106,7 @@ class Passages:
             "1.road": np.ones(len(seen), dtype=bool),
             "2.left": ~self.in_disc & (blocked | _held(seen, FLAG.LEFT)),
             "2.return": ~self.in_disc & _held(seen, FLAG.LEFT),
+            "2.turn": ~self.in_disc,
             "3.stop": entered,
             "3.order": entered & _held(came, FLAG.AHEAD),
             "3.clear": entered & _held(came, BARRED),

@@ -34,6 +34,8 @@ def sentence_of(record: Record, score: Score, breach: Violation) -> str:
         case "2.return":
             since = f"as it had been since {breach.since:.2f} s"
             return f"{when} was still left of the centre line of {_road(breach)}, {since}."
+        case "2.turn":
+            return f"{when} turned round on {_road(breach)}."
         case "1.goal":
             since = f"since {breach.since:.2f} s" if breach.since > 0.0 else "yet"
             return f"{when} had not visited the goal {_crossing(breach)} {since}, which is longer than a gap may be."

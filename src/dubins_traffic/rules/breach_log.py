@@ -28,21 +28,22 @@ class _Rule(NamedTuple):
     ROAD: int = 1
     LEFT_UNBLOCKED: int = 2
     RETURN: int = 3
-    STOP: int = 4
-    ORDER: int = 5
-    CLEARANCE: int = 6
-    FAULT: int = 7
-    ENTER: int = 8
-    TICKETS: int = 9
-    EXIT: int = 10
-    REST: int = 11
-    GOAL: int = 12
+    TURN: int = 4
+    STOP: int = 5
+    ORDER: int = 6
+    CLEARANCE: int = 7
+    FAULT: int = 8
+    ENTER: int = 9
+    TICKETS: int = 10
+    EXIT: int = 11
+    REST: int = 12
+    GOAL: int = 13
 
 
 RULE: Final = _Rule()
 
 RULES: Final[tuple[str, ...]] = (
-    "1.collision", "1.road", "2.left", "2.return", "3.stop", "3.order", "3.clear",
+    "1.collision", "1.road", "2.left", "2.return", "2.turn", "3.stop", "3.order", "3.clear",
     "E2", "E3.enter", "E3.tickets", "E4", "E5", "E6",
 )  # fmt: skip
 """Names of the rules, by number."""

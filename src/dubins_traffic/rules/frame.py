@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.lookup import (
@@ -18,7 +19,7 @@ from dubins_traffic.roads.lookup import (
 )
 from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
 from dubins_traffic.rules.hemming import hem_in
-from dubins_traffic.rules.label_cache import check_label_caches, relabel_from_cache
+from dubins_traffic.rules.label_cache import check_label_caches, forget_region, relabel_from_cache
 from dubins_traffic.rules.location import locate, moved2, put_in_order
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.queue import Queue, foremost, gather, keep_order
@@ -249,6 +250,8 @@ def _label_blocked(b: int, n: int, tick: int, tables: LabelTables) -> bool:
             own.free_needed,
         )
     if blocked:
+        if bits & FLAG.OVERTAKING == 0:
+            forget_region(tables.memory.kept[b, n // BLOCK], n)
         bits |= FLAG.BLOCKED | FLAG.OVERTAKING
     elif not beside and bits & FLAG.LEFT == 0:
         bits &= ~FLAG.OVERTAKING

@@ -235,6 +235,12 @@ def keep_region(
 
 
 @jit_inline
+def forget_region(block: ValidRegions, n: int) -> None:
+    """Let the labels of car n be found anew in the next frame."""
+    block.valid_low_x[n & (BLOCK - 1)] = NEVER_AGAIN
+
+
+@jit_inline
 def _keep_ring(block: ValidRegions, k: int, away2: float, own: TrialRules) -> None:
     """Store the ring about a car's vertex that holds `away2`: between the radii of disc, crossing and approach."""
     low = -1.0

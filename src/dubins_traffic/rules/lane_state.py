@@ -6,6 +6,7 @@ from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction_at
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.tables import NEVER_AGAIN, CarMemory
 
 
 @jit
@@ -63,9 +64,9 @@ def lane_here(
 
 @jit_inline
 def along_lane(
-    t: RoadTable, net: int, lane: int, fresh: bool, top: float, turn_back: float, pose: Pose
-) -> tuple[int, float, float, float, bool]:
-    """Return the new lane state: (lane, greatest progress, progress, lateral offset, whether it flipped).
+    t: RoadTable, net: int, lane: int, fresh: bool, reference: float, turn_back: float, pose: Pose
+) -> tuple[int, float, float, bool]:
+    """Return the new lane state: (lane, progress, lateral offset, whether it flipped).
 
     Parameters
     ----------
@@ -73,18 +74,34 @@ def along_lane(
         The roads.
     lane, fresh
         As `lane_here` returns them.
-    top
-        The greatest progress since the lane state was set, metres.
-    turn_back
-        Metres of progress lost that make a turn.
+    reference, turn_back
+        Progress from which backing is measured, and how far a car backs without turning, metres.
     pose
         Where the car is.
     """
     progress, lateral = lane_coordinates(t, net, lane, pose.x, pose.y)
-    if fresh or progress > top:
-        return lane, progress, progress, lateral, False
-    if top - progress < turn_back:
-        return lane, top, progress, lateral, False
+    if fresh or reference - progress < turn_back:
+        return lane, progress, lateral, False
     lane = lane ^ 1
     progress, lateral = lane_coordinates(t, net, lane, pose.x, pose.y)
-    return lane, progress, progress, lateral, True
+    return lane, progress, lateral, True
+
+
+@jit_inline
+def keep_tops(car: CarMemory, fresh: bool, overtakes: bool) -> None:
+    """Keep the greatest progress of a car whose progress is known, and the reference by which it would turn.
+
+    `fresh` tells whether its lane state was set or flipped in this frame, `overtakes` whether it overtook in the frame
+    before. The reference is the greatest progress, but does not rise while the car overtakes.
+    """
+    if fresh:
+        car.top = car.progress
+        car.held_top = NEVER_AGAIN
+        return
+    if overtakes:
+        car.held_top = min(car.held_top, car.top)
+    car.top = max(car.top, car.progress)
+    if not overtakes and car.held_top < NEVER_AGAIN:
+        car.held_top = max(car.held_top, car.progress)
+        if car.held_top >= car.top:
+            car.held_top = NEVER_AGAIN

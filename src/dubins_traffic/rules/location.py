@@ -35,10 +35,10 @@ from dubins_traffic.rules.label_cache import (
     still,
 )
 from dubins_traffic.rules.lane_cache import keep_arm, keep_road
-from dubins_traffic.rules.lane_state import along_lane, lane_here
+from dubins_traffic.rules.lane_state import along_lane, keep_tops, lane_here
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
-from dubins_traffic.rules.tables import CarMemory, Heads, LabelTables, Memory, TrialRules
+from dubins_traffic.rules.tables import NEVER_AGAIN, CarMemory, Heads, LabelTables, Memory, TrialRules
 
 RULE3 = FLAG.STOPPED | FLAG.CLEAR | FLAG.AHEAD
 
@@ -69,11 +69,13 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     turned = False
     if at >= 0:
         car.top = car.progress = car.lateral = 0.0
+        car.held_top = NEVER_AGAIN
     else:
         lane, fresh = lane_here(t, net, labels.at[b, n], lane_before, segment, off2, pose)
-        lane, car.top, car.progress, car.lateral, turned = along_lane(
-            t, net, lane, fresh, car.top, own.turn_back, pose
+        lane, car.progress, car.lateral, turned = along_lane(
+            t, net, lane, fresh, min(car.top, car.held_top), own.turn_back, pose
         )
+        keep_tops(car, fresh or turned, before & FLAG.OVERTAKING != 0)
     bits = _entry_flags(tick, t, own, crosses, crossed, lane_before, before)
     if off2 <= half_road * half_road:
         bits |= FLAG.ON_ROAD
@@ -93,7 +95,8 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     labels.bits[b, n] = bits | still(block, n) | lingers(block, n)
 
     spare, outside = _reach(car, pose, v, lane, t, own)
-    if not round_body or bits & FLAG.LEFT != 0 or (lane >= 0 and segment != lane // 2):
+    passes = bits & (FLAG.LEFT | FLAG.OVERTAKING) != 0 or car.held_top < NEVER_AGAIN
+    if not round_body or passes or (lane >= 0 and segment != lane // 2):
         spare = 0.0
     if not keep_road(block, n, lane, segment, v, car.lateral, outside, t, own):
         spare = min(spare, abs(sqrt(off2) - half_road))

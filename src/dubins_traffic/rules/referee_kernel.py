@@ -11,8 +11,8 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.kernels.arrays import Bits
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_look, jit_rare
 from dubins_traffic.roads.lookup import distance2, lane_end
-from dubins_traffic.rules.breach_log import NEVER_DUE, BreachLog, JudgedCar, RefereeTables
-from dubins_traffic.rules.breaches import judge_entry, judge_lane, judge_road
+from dubins_traffic.rules.breach_log import NEVER_DUE, RULE, BreachLog, JudgedCar, RefereeTables
+from dubins_traffic.rules.breaches import add, judge_entry, judge_lane, judge_road
 from dubins_traffic.rules.duties import judge_agent, judge_goals
 from dubins_traffic.rules.entry_margins import measure_entry
 from dubins_traffic.rules.frame import label_trial
@@ -108,6 +108,8 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
         car.left_since = -1
         car.free_since = -1
         car.unblocked_since = -1
+    if bits & FLAG.TURNED != 0:
+        add(log, car, RULE.TURN, tick, tick, -1, lane)
     if bits & ENTERS_CROSSING == ENTERS_CROSSING:
         stopped = False
         if car.bits & FLAG.STOPPED != 0:

@@ -97,6 +97,8 @@ class CarMemory:
     """Largest lateral coordinate of the body."""
     gap2: float
     """Squared distance of the body, without its rounding, from the crossing ahead, -1 if there is none."""
+    held_top: float = NEVER_AGAIN
+    """Progress from which its backing is measured, if that is less than `top`: it was held while the car overtook."""
     approach_since: int = -1
     """First tick of the present run of approach."""
     ticket: int = -1

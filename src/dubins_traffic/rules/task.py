@@ -10,6 +10,7 @@ i stands for the name of a car, x and y for a lattice point. All mean what docs/
 ``collision_i``                       i has touched a car or an obstacle since the frame before
 ``on_road_i`` ``left_i``              docs/rules.md#on-road, docs/rules.md#left
 ``overtaking_i`` ``hemmed_i``         docs/rules.md#overtaking, docs/rules.md#hemmed
+``turned_i``                          the lane state flipped in this frame (docs/rules.md#lane-state)
 ``at_fault_i``                        docs/rules.md#at-fault
 ``enter_i_x_y`` ``clear_i_x_y``       i enters the crossing; no other car is in it
 ``stopped_i_x_y``                     i has stopped at the crossing
@@ -100,6 +101,7 @@ def _rules_2_and_3(name: str, crossings: Iterable[Point], rules: RuleParameters)
     found = [
         always(implies(left, prop(f"overtaking_{name}"))),
         always(implies(left, eventually(back, (0.0, rules.left_time)))),
+        always(negation(prop(f"turned_{name}"))),
     ]
     for point in crossings:
         enter, stopped, ahead, clear = (

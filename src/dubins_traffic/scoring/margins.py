@@ -22,7 +22,7 @@ from dubins_traffic.scoring.verdict import EGO_NAME, Verdict
 if TYPE_CHECKING:
     from dubins_traffic.rules.breach_log import EntryMargins
 
-MEASURED: Final = ("1.road", "2.left", "2.return")
+MEASURED: Final = ("1.road", "2.left", "2.return", "2.turn")
 """The rules whose margins `find_margins` finds, in the order of `EgoMargins`."""
 ENTERED: Final = ("3.stop", "3.order", "3.clear")
 """The rules whose margins the referee finds, in the order of `rules.breach_log.EntryMargins`."""
@@ -54,8 +54,9 @@ class Margins:
 
     The signals are the gap to the nearest other body, the distance of the centre to the edge of the road, and how far
     the body reaches beyond the line at which `left` rises (or, once it has risen, falls); `overtaking` and `hemmed` are
-    infinite. The robustness of ``[] (left -> overtaking)`` is the least margin to the line while the ego does not
-    overtake, that of ``[] (left -> <>[0,d] (!left | hemmed))`` the least of the greatest margins within d.
+    infinite; that of `turned` is how much farther the ego could have backed. The robustness of
+    ``[] (left -> overtaking)`` is the least margin to the line while the ego does not overtake, that of
+    ``[] (left -> <>[0,d] (!left | hemmed))`` the least of the greatest margins within d.
     """
 
     def begin(self, instance: Instance) -> None:
@@ -105,7 +106,7 @@ class Margins:
         for name in ("x", "y", "c", "s", "bits", "lane"):
             ego[name] = np.concatenate([getattr(block, name)[:, EGO] for block in self._blocks])
         find_margins(only, np.array([count]), ego, only, tables, found)
-        return margins_by_rule(gap, [found[0].road, found[0].line, found[0].back])
+        return margins_by_rule(gap, [found[0].road, found[0].line, found[0].back, found[0].turn])
 
 
 def entries_by_rule(found: EntryMargins, period: float) -> dict[str, float | None]:

@@ -28,6 +28,8 @@ class MarginRules:
     left_set: float
     left_release: float
     """Where `left` rises and where it falls, metres."""
+    turn_back: float
+    """How far progress falls before a lane state flips, metres."""
     window: int
     """Ticks within which the ego must be back."""
 
@@ -57,7 +59,8 @@ class EgoMargins:
     road: float
     line: float
     back: float
-    """The margins of 1.road, 2.left and 2.return."""
+    turn: float
+    """The margins of 1.road, 2.left, 2.return and 2.turn."""
 
 
 class MarginTables(Tables):
@@ -75,6 +78,7 @@ def margin_rules(rules: Sequence[RuleParameters], periods: Sequence[float], inde
     numbers: list[int] = index.tolist()
     found["left_set"] = [rules[k].left_set for k in numbers]
     found["left_release"] = [rules[k].left_release for k in numbers]
+    found["turn_back"] = [rules[k].turn_back for k in numbers]
     found["window"] = [ticks(rules[k].left_time, periods[k]) for k in numbers]
     return found
 
@@ -134,6 +138,34 @@ def _find_margin(
     found.road = float(half_road) - sqrt(farthest) if begun else INFINITE
     found.line = line
     found.back = _least_of_greatest(signal, frames, tables.rules[b].window)
+    found.turn = _least_way_back(frames, ego, net, tables.rules[b].turn_back, roads)
+
+
+@jit
+def _least_way_back(frames: Any, ego: Rows[EgoFrame], net: Any, turn_back: float, roads: RoadTable) -> float:
+    """Return the least distance, metres, by which the ego could have backed farther without turning round.
+
+    It is negative, or 0, in a frame in which it turned; infinite without lane state. Norm: docs/rules.md#lane-state.
+    """
+    least = INFINITE
+    reference = 0.0
+    before = -1
+    overtook = False
+    for f in range(frames):
+        own = ego[f]
+        lane = own.lane
+        if lane >= 0:
+            turned = own.bits & FLAG.TURNED != 0
+            came = lane ^ 1 if turned else lane
+            progress, _ = lane_coordinates(roads, net, came, own.x, own.y)
+            if came != before or (not overtook and progress > reference):
+                reference = progress
+            least = min(least, turn_back - (reference - progress))
+            if turned:
+                reference, _ = lane_coordinates(roads, net, lane, own.x, own.y)
+        before = lane
+        overtook = own.bits & FLAG.OVERTAKING != 0
+    return least
 
 
 @jit

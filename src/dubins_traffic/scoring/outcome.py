@@ -100,7 +100,7 @@ class BatchScores:
                 lambda car, first, last: bool(first <= self._tally.sensed[b, car] <= last),
                 lambda car, tick: (car, tick) in seen,
                 running,
-                margins_by_rule(gap, (margins.road, margins.line, margins.back))
+                margins_by_rule(gap, (margins.road, margins.line, margins.back, margins.turn))
                 | entries_by_rule(entry, instance.problem.period),
                 whole=whole,
                 by_controller=ending.by_controller,

@@ -158,12 +158,11 @@ def _leaves_lane(
     if at >= 0:
         return REASON.NOTHING
     after, fresh = lane_here(roads, net, labels.at[b, EGO], lane, segment, off2, pose)
-    after, top, progress, lateral, turned = along_lane(
-        roads, net, after, fresh, shields.ego[b].top, back, pose
-    )
+    top = shields.ego[b].top
+    after, progress, lateral, turned = along_lane(roads, net, after, fresh, top, back, pose)
     if turned:
         return REASON.TURN
-    if after == lane and top - progress > back - TURNING:
+    if not fresh and after == lane and top - progress > back - TURNING:
         before, _ = lane_coordinates(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
         if progress < before:
             return REASON.TURN

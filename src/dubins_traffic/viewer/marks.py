@@ -18,6 +18,7 @@ RULES = {
     "1.road": "leaves the road",
     "2.left": "reaches over the centre line",
     "2.return": "stays over the centre line",
+    "2.turn": "turns round on a road",
     "3.stop": "enters a crossing without a stop",
     "3.order": "enters a crossing before its turn",
     "3.clear": "enters a crossing that is taken",
