@@ -242,7 +242,10 @@ class World(Careful):
     @property
     def rule_parameters(self) -> dict[str, Any]:
         """All parameters of the rules by name, empty if they are not to be judged."""
-        return self.rules.model_dump() if self.rules else {}
+        if not self.rules:
+            return {}
+        usual, own = RuleParameters.for_width(self.car.w).to_mapping(), self.rules.model_dump()
+        return usual | {name: own[name] for name in self.rules.model_fields_set}
 
     @property
     def obstacle_values(self) -> tuple[Obstacle, ...]:

@@ -13,11 +13,17 @@ from dubins_traffic.errors import InputError
 EDITION = 2
 """The edition of the rules of the road that is judged; edition 1 had no `lingers` and differed in E3 to E6."""
 
+USUAL_W = 0.3
+"""The half-lane width that the defaults of lengths are for, metres (docs/rules.md#scale)."""
+NO_LENGTHS = ("_time", "_rounds")
+"""Ends of the names of fractional parameters that are no lengths, nor lengths by second."""
+
 
 @dataclass(frozen=True, slots=True)
 class RuleParameters:
     """Parameters of the rules by name; metres, seconds, metres per second.
 
+    Defaults are those of roads of half-lane width 0.3 m; `for_width` gives them for others.
     A problem that asks for the rules carries all of them in `Problem.rules`.
 
     Raises
@@ -132,6 +138,18 @@ class RuleParameters:
                 value=self.queue_distance,
                 expected=f"at least approach_distance ({self.approach_distance})",
             )
+
+    @classmethod
+    def for_width(cls, w: float) -> RuleParameters:
+        """Return the defaults on roads of half-lane width `w` (m): lengths, and `still_speed`, grow with it."""
+        scale = w / USUAL_W
+        usual = cls().to_mapping()
+        lengths = {
+            name: value * scale
+            for name, value in usual.items()
+            if isinstance(value, float) and not name.endswith(NO_LENGTHS)
+        }
+        return cls.from_mapping(usual | lengths)
 
     @classmethod
     def from_mapping(cls, rules: Mapping[str, Any]) -> RuleParameters:
