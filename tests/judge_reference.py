@@ -39,11 +39,15 @@ class Judge:
         toward = -1 if car.lane is None else self.reference.toward(car.lane)
         return {
             **car.facts, "toward": toward, "ticket": car.ticket, "forfeits": car.forfeits,
-            "spot": car.pose[:2],
-            "reaches": [self.reference.lateral_range((car.facts["segment"], way), car) for way in (0, 1)],
+            "spot": car.pose[:2], "sides": self.sides(car),
             "progress": 0.0 if car.lane is None else self.reference.s(car),
             "left_by": self.reference.lateral_range(car.lane, car)[1] if car.lane else 0.0,
         }  # fmt: skip
+
+    def sides(self, car: Car) -> dict[tuple[int, int], tuple[float, float]]:
+        """Between which laterals a body is, in the two lanes of the segment nearest to it."""
+        segment = car.facts["segment"]
+        return {lane: self.reference.lateral_range(lane, car) for lane in ((segment, 0), (segment, 1))}
 
     def stays_of(self, n: int) -> Found:
         """E4: the breaches of a car, at most one a stay; also note the frames in which it has stayed for too long."""
@@ -121,13 +125,21 @@ class Judge:
         s, lateral = self.reference.coordinates(arm, *spot)
         return math.hypot(s - self.problem.intersection_radius, lateral + self.problem.car.w)
 
-    def takes(self, k: int, other: int, v: int, arm: tuple[int, int], gap: float) -> bool:
-        """Whether a centre outside the disc of v is in a lane out of it, near the disc."""
+    def takes(self, k: int, other: int, v: int, arm: tuple[int, int]) -> bool:
+        """Whether who is outside the disc of v, but near it, is in a lane out of it: no car has room between."""
         facts = self.past[k][other]
         s, lateral = self.reference.coordinates(arm, *facts["spot"])
         far = math.dist(facts["spot"], self.reference.points[v]) - self.problem.intersection_radius
-        inside = -self.reference.w2 <= lateral <= 0 and s > 0 and facts["segment"] == arm[0]
-        return facts["at"] != v and inside and far <= gap
+        room = max(self.rules.exit_gap, 3 * self.problem.car.body.reach + self.rules.exit_gap / 4)
+        if facts["at"] == v or s <= 0 or facts["segment"] != arm[0] or far > room:
+            return False
+        if self.reference.narrows(*facts["sides"][arm]):
+            self.fired["narrowed exit"] += not -self.reference.w2 <= lateral <= 0
+            return True
+        if facts["lane"] == 2 * arm[0] + 1 - arm[1]:
+            self.fired["comes beside"] += bool(-self.reference.w2 <= lateral <= 0)
+            return False
+        return -self.reference.w2 <= lateral <= 0
 
     def free(self, k: int, n: int, v: int, arm: tuple[int, int], came: int) -> bool:
         """Whether a lane out of v is free for n, which came there by the lane `came` or is to."""
@@ -140,11 +152,12 @@ class Judge:
             if nearer and self.contends(k, other, v, came):
                 self.fired["nearer"] += 1
                 return False
-            if self.takes(k, other, v, arm, self.rules.exit_gap):
+            if self.takes(k, other, v, arm):
                 return False
-        radius = self.problem.intersection_radius
+        radius, gap = self.problem.intersection_radius, self.rules.exit_gap
+        end = radius + max(gap, 2 * self.problem.car.body.reach + gap / 4)
         for obstacle in self.problem.obstacles:
-            reach = self.reference.obstacle_range(arm, obstacle, radius, radius + self.rules.exit_gap)
+            reach = self.reference.obstacle_range(arm, obstacle, radius, end)
             if reach is not None and self.reference.narrows(*reach):
                 self.fired["narrow exit"] += 1
                 return False
@@ -199,7 +212,7 @@ class Judge:
             if other == n or its["segment"] != lane[0]:
                 continue
             ahead = self.reference.coordinates(lane, *its["spot"])[0] - here
-            if 0 < ahead <= reach and self.reference.narrows(*its["reaches"][lane[1]]):
+            if 0 < ahead <= reach and self.reference.narrows(*its["sides"][lane]):
                 return True
         for obstacle in self.problem.obstacles:
             side = self.reference.obstacle_range(lane, obstacle, here, here + reach)
@@ -224,18 +237,46 @@ class Judge:
 
     def held(self, k: int, v: int) -> bool:
         """E6: whether the tick that ends in frame k does not count for the goal v."""
-        near = False
-        for n in self.cars:
-            if n == 0 or self.past[k][n]["at"] != v:
-                continue
+        there = [n for n in self.cars if n and self.past[k][n]["at"] == v]
+        ego = self.past[k][0]["spot"]
+        for n in there:
             came = self.came_by(k, n)
-            for arm in self.exits(v, came):
-                if self.free(k, n, v, arm, came):
-                    return False
-                away = self.mouth(arm, self.past[k][0]["spot"])
-                gap = self.rules.goal_gap
-                near = near or away <= gap or self.takes(k, 0, v, arm, gap)
-        return near
+            if any(self.free(k, n, v, arm, came) for arm in self.exits(v, came)):
+                return False
+        for n in there:
+            for arm in self.exits(v, self.came_by(k, n)):
+                if self.mouth(arm, ego) <= self.rules.goal_gap:
+                    return True
+        waiting = {0}
+        while more := {n for n in self.cars if n not in waiting and self.waits(k, n, waiting)}:
+            waiting |= more
+        self.fired["E6 waits"] += bool(waiting & set(there))
+        return bool(waiting & set(there))
+
+    def waits(self, k: int, n: int, waiting: set[int]) -> bool:
+        """E6: whether a car waits for one of those that wait for the ego."""
+        facts, reach = self.past[k][n], self.rules.way_distance
+        lane, v = facts["lane"], facts["crosses"]
+        for other in waiting:
+            its = self.past[k][other]
+            if lane >= 0:
+                ahead = its["lane"] == lane and 0 < its["progress"] - facts["progress"] <= reach
+                begins = self.reference.length(lane // 2) - self.problem.intersection_radius
+                arrives = begins - facts["progress"] <= reach and its["crosses"] == facts["toward"]
+                if ahead or arrives or (facts["blocked"] and its["segment"] == lane // 2):
+                    return True
+            if v >= 0 and not facts["leaves"]:
+                exits = self.exits(v, self.came_by(k, n))
+                if its["crosses"] == v or any(self.fills(k, n, other, v, arm) for arm in exits):
+                    return True
+        return False
+
+    def fills(self, k: int, n: int, other: int, v: int, arm: tuple[int, int]) -> bool:
+        """Whether a car is why a lane out of v is not free for car n."""
+        came = self.came_by(k, n)
+        nearer = self.mouth(arm, self.past[k][other]["spot"]) < self.mouth(arm, self.past[k][n]["spot"])
+        within = self.past[k][other]["at"] == v and nearer and self.contends(k, other, v, came)
+        return within or self.takes(k, other, v, arm)
 
     def ticks(self, duration: float) -> int:
         return self.reference.ticks(duration)

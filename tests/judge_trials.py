@@ -30,9 +30,9 @@ QUICK = {
 }  # fmt: skip
 
 CLAUSES = {
-    "lingers", "nearer", "passes by", "narrow exit", "way back", "same tick", "ego in the bend", "one in the bend",
-    "full bend", "stopped again", "E4 paused", "E4 added up", "left by the ego",
-    "E6 paused", "E3.enter", "E3.tickets", "E4", "E5", "E6",
+    "lingers", "nearer", "passes by", "narrow exit", "narrowed exit", "comes beside", "way back", "same tick",
+    "ego in the bend", "one in the bend", "E6 waits", "full bend", "stopped again", "E4 paused", "E4 added up",
+    "left by the ego", "E6 paused", "E3.enter", "E3.tickets", "E4", "E5", "E6",
 }  # fmt: skip
 """What is to happen in some trial: rules broken, and clauses by which no rule is or time does not count."""
 

@@ -102,7 +102,7 @@ def test_version_1_says_more() -> None:
         PolygonObstacle(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.5, 0.2))),
     )
     assert config.settings.rule_parameters["tickets"] == 3
-    assert config.settings.rule_parameters["still_speed"] == 0.05
+    assert config.settings.rule_parameters["still_speed"] == 0.1
     assert config.to_document()["note"] == "kept"
     assert load_config(document | {"rules": False, "laser": False}).settings.rule_parameters == {}
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from math import ceil
+import math
+from dataclasses import replace
 
 import pytest
 
+from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
 from dubins_traffic.roads.network import RoadNetwork
 from tests.judging import (
     EASED,
@@ -25,6 +27,9 @@ from tests.judging import (
     said,
 )
 from tests.rules_scripts import STAR, on_lane
+
+BESIDE = 2.0 * RHO + 0.1 + RHO - 0.6
+"""How far out of a lane a centre is whose body just leaves room for another and 0.1 m, metres."""
 
 both = pytest.mark.parametrize("roads", ROADS.values(), ids=ROADS)
 anybody = pytest.mark.parametrize("who", [0, 1], ids=["ego", "agent"])
@@ -120,8 +125,54 @@ def test_e4_no_exit_is_free_with_somebody_near_in_each(roads: RoadNetwork) -> No
     for grain, expected in ((0.0, []), (EPS, late)):
         assert found(0.8 - EPS) == []
         assert found(0.8 + EASED + grain) == expected
-        assert found(0.5, EASED + grain) == expected
-        assert found(0.5, -0.6 - EASED - grain) == expected
+        assert found(0.5, BESIDE + EASED + grain) == expected
+        assert found(0.5, -0.6 - BESIDE - EASED - grain) == expected
+
+
+@both
+def test_e4_a_free_exit_has_room_for_a_whole_body(roads: RoadNetwork) -> None:
+    """Rectangles of 0.6 m: no other centre within 3 rho + 0.2 m of the disc, no obstacle within 2 rho + 0.2 m."""
+    box, out = Car(body=Rectangle(0.6, 0.28)), lanes_out(roads)
+    rho = box.body.reach
+    inside = on_lane(roads, out[0], 0.1, -0.1)
+
+    def found(gap: float, obstacle: float | None = None) -> list[tuple[object, ...]]:
+        others = [after(roads, lane, 0.4) for lane in out]
+        others[1] = after(roads, out[1], gap - RHO)
+        trial = case(roads, len(others) + 1, exit_time=3.0)
+        x, y, _, _ = on_lane(roads, out[1], 1.05 + (obstacle or 9.0), -0.3)
+        problem = replace(trial.problem, car=box, obstacles=(DiscObstacle(x, y, 0.05),))
+        script = hold(others[0], inside, *others[1:], frames=31)
+        return [entry for entry in said(judged(replace(trial, problem=problem), script)) if entry[0] == "E4"]
+
+    late = [("E4", 1, 30, 0)]
+    assert found(3.0 * rho + 0.2 - EPS) == []
+    assert found(3.0 * rho + 0.2 + EPS) == late
+    assert found(1.5, 2.0 * rho + 0.2 - EPS) == []
+    assert found(1.5, 2.0 * rho + 0.2 + EPS) == late
+
+
+@both
+def test_e4_who_comes_toward_the_disc_takes_an_exit_only_by_narrowing_it(roads: RoadNetwork) -> None:
+    """Rectangles of 0.26 m leave room for another one where their centres are just in the lane."""
+    box, out = Car(body=Rectangle(0.5, 0.26)), lanes_out(roads)
+    inside = on_lane(roads, out[0], 0.1, -0.1)
+
+    def found(aside: float, *, comes: bool) -> list[tuple[object, ...]]:
+        others = [after(roads, lane, 0.4) for lane in out]
+        x, y, c, s = after(roads, out[1], 0.3, aside)
+        others[1] = (x, y, -c, -s) if comes else (x, y, c, s)
+        trial = case(roads, len(others) + 1, exit_time=3.0, rest_time=99.0)
+        script = hold(others[0], inside, *others[1:], frames=31)
+        boxed = replace(trial, problem=replace(trial.problem, car=box))
+        return [entry for entry in said(judged(boxed, script)) if entry[0] == "E4"]
+
+    late, room = [("E4", 1, 30, 0)], 0.6 - 0.13 - 0.36
+    for comes in (False, True):
+        assert found(-room - EPS, comes=comes) == []
+        assert found(EPS, comes=comes) == late
+    assert found(-room + EPS, comes=True) == late
+    assert found(-room + EPS, comes=False) == []
 
 
 @both
@@ -223,7 +274,7 @@ def test_e5_a_journey_has_a_minute_and_the_time_for_its_way(roads: RoadNetwork) 
     def found(frames: int, **rules: float) -> list[tuple[object, ...]]:
         return said(judged(case(roads, 2, **rules), pair(roads, 1, [place] * frames)))
 
-    whole = 600 + ceil(10.0 * 4.0 * float(roads.lengths.max()) / 0.7)
+    whole = 600 + math.ceil(10.0 * 4.0 * float(roads.lengths.max()) / 0.7)
     assert found(whole) == []
     assert found(whole + 1) == [("E5", 1, whole, 0)]
     assert found(600, journey_lengths=0.0) == []
@@ -381,10 +432,8 @@ def test_e6_a_goal_is_free_again_in_time(roads: RoadNetwork, who: int) -> None:
 @both
 def test_e6_time_does_not_count_in_which_the_ego_is_at_the_last_exit(roads: RoadNetwork) -> None:
     """A dead end, or a bend one of whose exits is the way by which the agent came."""
-    v = next((v for v, degree in enumerate(roads.degrees) if degree == 1), None)
-    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2) if v is None else v
-    out, back = roads.arms(v)[0], roads.arms(v)[-1]
-    inside, came = on_lane(roads, out, 0.2, 0.0), before(roads, back ^ 1, 0.1)
+    v, inside, came = way_out(roads)
+    out = roads.arms(v)[0]
 
     def found(gap: float, stays: int, **rules: float) -> list[tuple[object, ...]]:
         ego = after(roads, out, gap - RHO)
@@ -397,7 +446,51 @@ def test_e6_time_does_not_count_in_which_the_ego_is_at_the_last_exit(roads: Road
     assert found(0.8 - EPS, 80) == []
     assert found(0.8 + EASED, 15) == [("E6", 1, 46, 1)]
     assert found(0.8 + 2 * EPS, 15) == [("E6", 1, 31, 1)]
-    assert found(0.8 - EPS, 15, goal_gap=0.3) == [("E6", 1, 31, 1)]
+
+
+@both
+def test_e6_time_does_not_count_while_the_ego_is_at_the_mouth_of_a_taken_exit(roads: RoadNetwork) -> None:
+    """A car takes the exit of a dead end or bend; the ego is beside it, in the other lane, or far away."""
+    v, inside, came = way_out(roads)
+    out = roads.arms(v)[0]
+    takes, beside = after(roads, out, 0.3), after(roads, out, 0.1, 0.3)
+
+    def found(ego: tuple[float, ...], **rules: float) -> list[tuple[object, ...]]:
+        script = [[ego, inside if k else came, takes] for k in range(40)]
+        problem = case(roads, 3, [roads.intersections[v]], goal_time=3.0, exit_time=99.0, **rules)
+        return [entry for entry in said(judged(problem, script)) if entry[0] == "E6"]
+
+    assert found(beside) == []
+    assert found(beside, goal_gap=0.3) == [("E6", 1, 31, 1)]
+    assert found(away(roads)) == [("E6", 1, 31, 1)]
+
+
+@both
+def test_e6_time_does_not_count_while_a_queue_from_the_ego_takes_the_exit(roads: RoadNetwork) -> None:
+    """The car that takes the exit is behind the ego, or behind one that is behind the ego, within 1.5 m each."""
+    v, inside, came = way_out(roads)
+    out = roads.arms(v)[0]
+    takes = after(roads, out, 0.3)
+    begins = math.sqrt((1.3 + RHO) ** 2 - 0.09)
+
+    def found(*ahead: float) -> list[tuple[object, ...]]:
+        line = [on_lane(roads, out, begins + gap, -0.3) for gap in ahead]
+        script = [[line[0], inside if k else came, takes, *line[1:]] for k in range(40)]
+        problem = case(roads, len(script[0]), [roads.intersections[v]], goal_time=3.0, exit_time=99.0)
+        return [entry for entry in said(judged(problem, script)) if entry[0] == "E6"]
+
+    assert found(1.5 - EPS) == []
+    assert found(1.5 + EPS) == [("E6", 1, 31, 1)]
+    assert found(1.5 + EPS, 0.7) == []
+    assert found(0.6, 1.2) == []
+
+
+def way_out(roads: RoadNetwork) -> tuple[int, tuple[float, ...], tuple[float, ...]]:
+    """Return a dead end, or a bend, a place in it, and one before it from which there is but one exit."""
+    v = next((v for v, degree in enumerate(roads.degrees) if degree == 1), None)
+    v = next(v for v, degree in enumerate(roads.degrees) if degree == 2) if v is None else v
+    out, back = roads.arms(v)[0], roads.arms(v)[-1]
+    return v, on_lane(roads, out, 0.2, 0.0), before(roads, back ^ 1, 0.1)
 
 
 @both

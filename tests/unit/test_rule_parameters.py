@@ -59,6 +59,17 @@ def test_bad_parameters_are_refused_by_name(rules: dict[str, Any], field: str) -
     assert caught.value.expected
 
 
+def test_lengths_left_out_grow_with_the_lanes() -> None:
+    town = {**load_config("town").to_document(), "rules": {"turn_back": 0.4}}
+    town["car"] = {**town["car"], "w": 0.33}
+    own, usual = draw(load_config(town), 0, 0).problem.rules, RuleParameters()
+    assert own["way_distance"] == pytest.approx(1.1 * usual.way_distance)
+    assert own["still_speed"] == pytest.approx(1.1 * usual.still_speed)
+    assert (own["turn_back"], own["rest_time"], own["gap_rounds"]) == (0.4, usual.rest_time, usual.gap_rounds)
+    assert own.keys() == usual.to_mapping().keys()
+    assert RuleParameters.for_width(0.3) == usual
+
+
 @pytest.mark.parametrize(
     ("duration", "rate", "expected"),
     [(0.5, 30.0, 15), (0.1, 30.0, 3), (0.1, 10.0, 1), (1.0, 30.0, 30),

@@ -41,8 +41,7 @@ REAL: dict[str, Any] = {
         "body": {"rectangle": {"length": 3.6, "width": 1.63}},
         "bounds": {"speed": 8.0, "yaw_rate": 2.0, "turning_radius": 3.8},
     },
-    "rules": {"approach_distance": 2.0, "queue_distance": 2.0, "exit_time": 10.0, "turn_back": 1.5,
-              "segment_slack": 2.0, "sensing_slack": 2.0, "exit_gap": 3.0},
+    "rules": {"exit_time": 10.0},
     "e-agents": [{"type": "lawful", "name": "car", "count": 5}],
 }  # fmt: skip
 """In metres as large as a car is."""

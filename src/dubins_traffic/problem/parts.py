@@ -262,14 +262,22 @@ def _rule_field(name: str, default: float) -> tuple[Any, Any]:
     return (Annotated[float, Field(ge=0, le=limits.METRES)], Field(default, description=name))
 
 
+class GivenRules(Strict):
+    """The parameters of the rules that a document gives."""
+
+    def on_roads(self, w: float) -> dict[str, Any]:
+        """Return all parameters by name; those left out are as usual on roads of half-lane width `w` (m)."""
+        return RuleParameters.for_width(w).to_mapping() | self.model_dump(exclude_unset=True)
+
+
 if TYPE_CHECKING:
 
-    class RulesModel(Strict):
+    class RulesModel(GivenRules):
         """Parameters of the rules to judge."""
 else:
     RulesModel = create_model(
         "RulesModel",
-        __base__=Strict,
+        __base__=GivenRules,
         __doc__="Parameters of the rules to judge; those left out have their defaults (spec.parameters).",
         **{name: _rule_field(name, value) for name, value in RuleParameters().to_mapping().items()},
     )

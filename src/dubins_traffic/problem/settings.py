@@ -242,7 +242,7 @@ class World(Careful):
     @property
     def rule_parameters(self) -> dict[str, Any]:
         """All parameters of the rules by name, empty if they are not to be judged."""
-        return self.rules.model_dump() if self.rules else {}
+        return self.rules.on_roads(self.car.w) if self.rules else {}
 
     @property
     def obstacle_values(self) -> tuple[Obstacle, ...]:

@@ -71,8 +71,8 @@ class RefereeParameters:
     """Distance from a vertex beyond which a car neither meets the disc nor is in the way of a car that leaves it."""
     way: float
     """E5's way ahead."""
-    exit_gap: float
-    """E4's free length of an exit."""
+    exit_room: float
+    """E4's length of an exit that no obstacle narrows."""
     goal_gap: float
     """E6's distance of the ego from an exit."""
     lane_middle: float
@@ -142,6 +142,8 @@ class JudgedCar:
     """Run of being where its centre is: at a vertex or none."""
     in_since: int = -1
     """Run of being in the disc that its body meets."""
+    waits: int = 0
+    """Whether the car waits for the ego, 0 or 1, in the frame in which a goal was last asked for it."""
     came_by: int = -1
     """The lane by which the car came into the disc that its body meets, -1 if it started there."""
     ticket: int = -1
@@ -281,11 +283,12 @@ def pack_terms(
     terms = table(RefereeParameters, len(parameters))
     for b, (given, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
         own = terms[b]
-        far = radius + given.exit_gap + GRAIN
+        reach = float(cars.reach[b])
+        far = radius + given.room_beyond(reach, 3) + GRAIN
         own.exit2 = far * far
-        own.lone = far + 2.0 * float(cars.reach[b])
+        own.lone = far + 2.0 * reach
         own.way = given.way_distance + GRAIN
-        own.exit_gap = given.exit_gap + GRAIN
+        own.exit_room = given.room_beyond(reach, 2) + GRAIN
         own.goal_gap = given.goal_gap + GRAIN
         own.lane_middle = float(cars.w[b])
         own.judged = int(judged[b])

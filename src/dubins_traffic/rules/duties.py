@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.near import list_near, ticks_within
+from dubins_traffic.cars.near import list_near
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.roads.lookup import lane_end
@@ -17,6 +16,7 @@ from dubins_traffic.rules.breaches import FIRST_AND_CLEAR, add, at_goal, judge_q
 from dubins_traffic.rules.exits import ego_at_exit, find_exit, look_for_exit, way_back
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN
+from dubins_traffic.rules.waiting import find_waiting
 
 
 @jit_inline
@@ -183,24 +183,23 @@ def judge_goals(b: int, tick: int, tables: RefereeTables) -> None:
 
 @jit
 def _holds_up(b: int, v: int, tick: int, tables: RefereeTables) -> tuple[bool, int]:
-    """Tell whether the ego holds up the goal v (E6): no e-agent in it has a free exit, and the ego is near an exit.
+    """Tell whether the ego holds up the goal v (E6): no e-agent in it has a free exit.
 
-    Also returns the tick in which to ask again if no car comes or goes.
+    The ego also is near an exit, or one of those e-agents waits for it. Also returns the tick in which to ask again if
+    no car comes or goes.
     """
-    state, roads, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
-    row = int(roads.vert_off[own.net]) + v
-    vx, vy = roads.vertex[row].x, roads.vertex[row].y
-    dx, dy = state.x[b, EGO] - vx, state.y[b, EGO] - vy
-    spare = sqrt(dx * dx + dy * dy) - terms.lone - terms.goal_gap - own.lane_width
-    if spare > 0.0:
-        return False, tick + ticks_within(spare, tables.spacing, b)
+    roads, own = tables.roads, tables.rules[b]
     near = False
-    for n in range(EGO + 1, state.count[b]):
+    for n in range(EGO + 1, tables.state.count[b]):
         if tables.labels.at[b, n] != v:
             continue
         back = way_back(v, tables.log.car[b, n].came_by, roads, own)
-        count = list_near(state, b, tick, vx, vy, terms.lone, tables.spacing)
-        if find_exit(b, n, v, back, count, tables):
-            return False, tick + 1
-        near |= ego_at_exit(b, v, back, tables)
+        free, again = look_for_exit(b, n, tick, v, back, tables)
+        if free:
+            return False, again
+        near = near or ego_at_exit(b, v, back, tables)
+    if not near:
+        find_waiting(b, tick, tables)
+        for n in range(EGO + 1, tables.state.count[b]):
+            near |= tables.labels.at[b, n] == v and tables.log.car[b, n].waits != 0
     return near, tick + 1

@@ -7,10 +7,11 @@ from math import sqrt
 from dubins_traffic.cars.near import list_near, ticks_within
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import lane_coordinates
+from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at
 from dubins_traffic.roads.table import RoadTable
-from dubins_traffic.rules.blocking import lane_of, obstacle_narrows
+from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
 from dubins_traffic.rules.breach_log import RefereeParameters, RefereeTables
+from dubins_traffic.rules.shape import half_extent
 from dubins_traffic.rules.tables import GRAIN, TrialRules
 
 
@@ -39,15 +40,21 @@ def _passes_by(k: int, came: int, back: int) -> bool:
     return k != EGO and came >= 0 and came // 2 != back
 
 
-@jit_inline
-def stands_in_exit(along: float, lateral: float, away2: float, far2: float, width: float) -> bool:
-    """Tell whether a centre at (along, lateral) is in a lane out of a disc and near the disc.
+@jit
+def _takes(b: int, k: int, lane: int, along: float, lateral: float, tables: RefereeTables) -> bool:
+    """Tell whether car k, whose centre is outside the disc at the beginning of `lane` and near it, takes that lane.
 
-    The centre is outside the disc, and the lane is on the segment nearest to it. `away2` is its squared distance from
-    the intersection, near is up to `far2`. The lane reaches `width` metres right of the centre line.
+    `along` (m) and `lateral` (m) are its coordinates there. Its body narrows the lane, or its centre is in it and the
+    car does not go toward the disc.
     """
-    inside = -width - GRAIN <= lateral <= GRAIN
-    return inside and along > 0.0 and away2 <= far2
+    state, labels, roads, own = tables.state, tables.labels, tables.roads, tables.rules[b]
+    if labels.segment[b, k] != lane // 2 or along <= 0.0:
+        return False
+    if labels.lane[b, k] != lane ^ 1 and -own.lane_width - GRAIN <= lateral <= GRAIN:
+        return True
+    tx, ty = lane_direction_at(roads, own.net, lane, state.x[b, k], state.y[b, k])
+    half = half_extent(tx, ty, state.c[b, k], state.s[b, k], own.half_length, own.half_width, own.rounding)
+    return narrows(lateral - half, lateral + half, own.lane_width, own.free_needed + GRAIN)
 
 
 @jit_inline
@@ -69,12 +76,12 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
     for i in range(count):
         k = tables.spacing.near[i]
         if k != n:
-            taken |= _takes(b, n, k, v, back, tables)
+            taken |= taken_exits(b, n, k, v, back, tables)
     for arm in range(t.degree[row]):
         lane: int = t.arms[row, arm]
         if taken & (1 << arm) != 0 or lane // 2 == back:
             continue
-        near, far = own.radius, own.radius + terms.exit_gap
+        near, far = own.radius, own.radius + terms.exit_room
         if tables.obstacles.base[b] < 0 or not obstacle_narrows(
             tables.obstacles, lane_of(t, own, b, lane), near, far, own.free_needed + GRAIN
         ):
@@ -83,8 +90,11 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
 
 
 @jit_inline
-def _takes(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables) -> int:
-    """Return the lanes out of v that car k keeps car n from taking: bit `arm` is the lane of that arm."""
+def taken_exits(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables) -> int:
+    """Return the lanes out of v that car `k` (index) keeps car n from taking: bit `arm` is that arm's.
+
+    The lane on `back` (segment) may be among them.
+    """
     state, t, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
     net = own.net
     row = int(t.vert_off[net]) + v
@@ -105,9 +115,7 @@ def _takes(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables) -> 
             way = to_mouth(from_x, from_y, own, terms)
             in_the_way = to_mouth(along, lateral, own, terms) < way + GRAIN
         else:
-            in_the_way = tables.labels.segment[b, k] == lane // 2 and stands_in_exit(
-                along, lateral, away2, terms.exit2, own.lane_width
-            )
+            in_the_way = _takes(b, k, lane, along, lateral, tables)
         if in_the_way:
             taken |= 1 << arm
     return taken
@@ -149,27 +157,15 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
 
 @jit
 def ego_at_exit(b: int, v: int, back: int, tables: RefereeTables) -> bool:
-    """Tell whether the ego of trial b is near an exit of v (E6); the lane on segment `back` is no exit.
-
-    It is near if its centre is near the point where the lane leaves the disc, or in the lane and near the disc.
-    """
-    state, t, labels, own, terms = (
-        tables.state, tables.roads, tables.labels, tables.rules[b], tables.terms[b],
-    )  # fmt: skip
+    """Tell whether the ego of trial b is near the mouth of an exit of v (E6); the lane on `back` (segment) is none."""
+    state, t, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
     row = int(t.vert_off[own.net]) + v
     x, y = state.x[b, EGO], state.y[b, EGO]
-    dx, dy = x - t.vertex[row].x, y - t.vertex[row].y
-    far = own.radius + terms.goal_gap
     for arm in range(t.degree[row]):
         lane: int = t.arms[row, arm]
         if lane // 2 == back:
             continue
         along, lateral = lane_coordinates(t, own.net, lane, x, y)
-        takes = (
-            labels.at[b, EGO] != v
-            and labels.segment[b, EGO] == lane // 2
-            and stands_in_exit(along, lateral, dx * dx + dy * dy, far * far, own.lane_width)
-        )
-        if takes or to_mouth(along, lateral, own, terms) <= terms.goal_gap:
+        if to_mouth(along, lateral, own, terms) <= terms.goal_gap:
             return True
     return False

@@ -13,11 +13,17 @@ from dubins_traffic.errors import InputError
 EDITION = 2
 """The edition of the rules of the road that is judged; edition 1 had no `lingers` and differed in E3 to E6."""
 
+USUAL_W = 0.3
+"""The half-lane width that the defaults of lengths are for, metres (docs/rules.md#scale)."""
+NO_LENGTHS = ("_time", "_rounds", "_lengths")
+"""Ends of the names of fractional parameters that are no lengths, nor lengths by second."""
+
 
 @dataclass(frozen=True, slots=True)
 class RuleParameters:
     """Parameters of the rules by name; metres, seconds, metres per second.
 
+    Defaults are those of roads of half-lane width 0.3 m; `for_width` gives them for others.
     A problem that asks for the rules carries all of them in `Problem.rules`.
 
     Raises
@@ -76,7 +82,7 @@ class RuleParameters:
     tickets: int = 1
     """E3: most new tickets in one wait, from the first stop in a lane state to the disc or the lane state's end."""
     exit_gap: float = 0.8
-    """E4: an exit is free if no centre is in its lane within this distance of the disc."""
+    """E4: an exit is free if no centre is in its lane within this distance of the disc; long bodies ask for more."""
     exit_time: float = 5.0
     """E4: a disc with a free exit is left within this time."""
     shared_time: float = 60.0
@@ -138,6 +144,18 @@ class RuleParameters:
             )
 
     @classmethod
+    def for_width(cls, w: float) -> RuleParameters:
+        """Return the defaults on roads of half-lane width `w` (m): lengths, and `still_speed`, grow with it."""
+        scale = w / USUAL_W
+        usual = cls().to_mapping()
+        lengths = {
+            name: value * scale
+            for name, value in usual.items()
+            if isinstance(value, float) and not name.endswith(NO_LENGTHS)
+        }
+        return cls.from_mapping(usual | lengths)
+
+    @classmethod
     def from_mapping(cls, rules: Mapping[str, Any]) -> RuleParameters:
         """Return the parameters in `rules`, such as `Problem.rules`; those left out have their defaults.
 
@@ -149,6 +167,14 @@ class RuleParameters:
         values = tuple(rules.values())
         types = tuple(map(type, values))
         return _checked(tuple(rules), values, types) if _NUMBERS.issuperset(types) else _made(rules)
+
+    def room_beyond(self, reach: float, bodies: int) -> float:
+        """Return how far beyond a disc an exit has to be empty to be free (docs/rules.md#free-exit), metres.
+
+        `reach` (m) is a body's farthest point. In that distance there is room for `bodies` half bodies, one after
+        another: 2 where nothing else may be, 3 where no other centre may be.
+        """
+        return max(self.exit_gap, bodies * reach + 0.25 * self.exit_gap)
 
     def to_mapping(self) -> dict[str, Any]:
         """Return all parameters by name, in the order of their definition."""

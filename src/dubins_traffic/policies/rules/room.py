@@ -12,7 +12,9 @@ from dubins_traffic.policies.rules.narrow import offset_in_lane
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
+from dubins_traffic.rules.blocking import narrows
 from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.rules.shape import half_extent
 
 MARGIN = 0.02
 """Distance that a car keeps from a disc that it may not enter, metres."""
@@ -149,15 +151,25 @@ def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
 
 @jit_rare
 def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
-    """Tell whether the exit into the lane `out` is free (E4): no car in the lane is near the disc at its beginning."""
+    """Tell whether the exit into the lane `out` is free (E4): no car takes the lane near the disc at its beginning."""
     state, roads, drivers, scratch = traffic.state, traffic.roads, traffic.drivers, traffic.scratch
-    vehicle = drivers.vehicle[b]
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
+    tx, ty = lane_direction(roads, net, out)
     j = scratch.head[out >> 1]
     while j >= 0:
-        along, aside = lane_coordinates(
-            roads, drivers.net[b], out, float(state.x[b, j]), float(state.y[b, j])
+        along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
+        half = half_extent(
+            tx,
+            ty,
+            float(state.c[b, j]),
+            float(state.s[b, j]),
+            vehicle.half_length,
+            vehicle.half_width,
+            vehicle.rounding,
         )
-        if j != n and aside <= 0.0 and along <= vehicle.disc + vehicle.exit_gap:
+        takes = aside <= 0.0 and traffic.labels.lane[b, j] != out ^ 1
+        takes = takes or narrows(aside - half, aside + half, 2.0 * vehicle.middle, vehicle.needed)
+        if j != n and takes and along <= vehicle.disc + vehicle.exit_room:
             return False
         j = scratch.link[j]
     return True

@@ -204,7 +204,7 @@ class Vehicle:
     """After how long a car that does not move stands, seconds."""
     backs_up: float
     """How far anybody may back up, metres."""
-    exit_gap: float
+    exit_room: float
     """How far from the disc who stands in a lane leaves it free (E4), metres."""
     rest_time: float
     """For how long an e-agent may stand with a free way (E5), seconds."""
@@ -335,7 +335,7 @@ def _vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
         own.left_time = rules.left_time
         own.stand_time = rules.stand_time
         own.backs_up = rules.turn_back
-        own.exit_gap = rules.exit_gap
+        own.exit_room = rules.room_beyond(own.reach, 3)
         own.rest_time = rules.rest_time
         own.approaches = rules.approach_distance
         own.goal_time = rules.goal_time
