@@ -15,6 +15,7 @@ from tests.recordings import REALS, WHOLE
 
 _DATA = re.compile(r'<script[^>]*type="application/json"[^>]*>(.*?)</script>', re.DOTALL)
 _LEFT_OUT = ("record", "time_to_begin_s", "wall", "act_latency_s", "rounds_before_breach")
+_YOUNG = ("journey_lengths", "journey_start_time")
 
 
 def plain(value: object) -> bytes:
@@ -29,9 +30,10 @@ def _simple(value: Any) -> Any:
 def decoded_score(score: dt.Score) -> bytes:
     """Return a score without the record's place and what a wall clock measured.
 
-    The margins of rule 3, those of formulas, the rounds before the first breach and whether the trial was cut are left
-    out: they are younger than the hashes, and `tests/property/test_margin_signs.py`, `test_formula_margins.py`,
-    `test_batch.py` and `tests/unit/test_score_tables.py` have them.
+    What is said of `2.turn` but its breaches, the margins of rule 3, those of formulas, the rounds before the first
+    breach and whether the trial was cut are left out: they are younger than the hashes, and
+    `tests/property/test_margin_signs.py`, `test_formula_margins.py`, `test_batch.py` and
+    `tests/unit/test_score_tables.py` have them.
     """
     document = score.to_json()
     for formula in document["formulas"]:
@@ -39,18 +41,25 @@ def decoded_score(score: dt.Score) -> bytes:
     if document["verdict"] is not None:
         robustness = document["verdict"]["robustness"]
         del document["verdict"]["cut"]
+        del document["verdict"]["formulas"]["2.turn"]
         document["verdict"] = {
             **document["verdict"],
-            "robustness": {rule: robustness[rule] for rule in robustness if rule not in ENTERED},
+            "robustness": {rule: robustness[rule] for rule in robustness if rule not in (*ENTERED, "2.turn")},
         }
     return plain({name: document[name] for name in document if name not in _LEFT_OUT})
 
 
 def decoded_record(record: dt.Record) -> bytes:
-    """Return instance, frames, contacts, events and ending of a record."""
+    """Return instance, frames, contacts, events and ending of a record.
+
+    Parameters of the rules that are younger than the hashes are left out.
+    """
     frames = record.frames
+    instance = dt.instance_to_document(record.instance)
+    for name in _YOUNG if instance.get("rules") else ():
+        del instance["rules"][name]
     parts = [
-        plain(dt.instance_to_document(record.instance)),
+        plain(instance),
         plain([frames.first, frames.rate, record.controller]),
     ]
     parts += [getattr(frames, name).tobytes() for name in (*REALS, *WHOLE, "bits")]
