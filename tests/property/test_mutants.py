@@ -20,7 +20,7 @@ CASES = {
     "blind_sector": (178, 19.0),
     "clear_early": (2, 9.0),
     "left_long": (16, 16.0),
-    "swerves": (59, 23.0),
+    "swerves": (130, 14.0),
     "returns_early": (16, 20.0),
     "forgets_standing": (5, 20.0),
 }

@@ -76,7 +76,7 @@ def test_what_moves_up_while_it_is_passed_traps_nobody(seed: int) -> None:
 def test_who_parks_for_ever_where_it_cannot_be_passed_breaks_the_assumption(place: float, rule: str) -> None:
     """So the ego owes nothing more than to wait, and it breaks nothing."""
     parked = car("parked", "parked", turned(place, -W), vacates_after=None)
-    score = run_trial(on_grid([parked], 80.0, turned(6.0 - W, 12.0 - W)), "rules").score
+    score = run_trial(on_grid([parked], 100.0, turned(6.0 - W, 12.0 - W)), "rules").score
     assert rule in broken(score, "parked")
     assert broken(score, "ego") == set()
     assert score.verdict is not None
