@@ -34,7 +34,7 @@ def counted(folder: Path, number: int, tier: str) -> dict[str, Any]:
 def test_environments_count_a_rule_that_was_added(tmp_path, number: int, tier: str) -> None:
     found = counted(tmp_path, number, tier)
     breaches = found.pop("verdict")
-    assert breaches == {"1.collision": 1, "1.road": 1, "2.left": 2, NAME: breaches[NAME]}
+    assert breaches == {"1.collision": 1, "1.road": 1, "2.left": 2, "2.turn": 2, NAME: breaches[NAME]}
     assert breaches[NAME] >= 2
     assert [own for own in found.pop("sentences") if f"the ego broke {NAME} near (" in own]
     assert set(found.pop("expected")) == {rule for rule in RULES if not rule.startswith("E")}

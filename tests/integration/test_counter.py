@@ -29,7 +29,7 @@ def test_the_ego_is_kept_from_a_goal_and_nothing_assumed_is_broken(case: Case, c
     found = drive(case, controller, 1, 200.0)
     assert found.gap >= 120.0
     assert found.own == ()
-    assert found.others.isdisjoint(case.assumed)
+    assert found.others.isdisjoint(set(case.assumed) - case.falls_too)
 
 
 def test_cars_that_park_in_their_lanes_keep_the_ego_from_a_goal() -> None:
@@ -72,7 +72,7 @@ def test_a_weaker_assumption_than_the_problem_s_may_be_played() -> None:
     agents = tuple(replace(agent, parameters=parameters) for agent in own.e_agents)
     verdict = run_trial(replace(own, e_agents=agents), "rules").score.verdict
     assert verdict is not None
-    assert {one.rule for one in verdict.violations if one.car != "ego"} == {"E4"}
+    assert {one.rule for one in verdict.violations if one.car != "ego"} == {"E4", "E5"}
 
 
 @pytest.mark.parametrize(
