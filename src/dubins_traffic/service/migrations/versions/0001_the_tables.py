@@ -1,11 +1,13 @@
-"""The log of acts can only grow: the database itself refuses to change or remove a row of it."""
+"""The tables as `service.tables` states them; the database itself keeps the log of acts from any change but growth."""
 
 from __future__ import annotations
 
 from alembic import op
 
-revision = "0002"
-down_revision = "0001"
+from dubins_traffic.service.tables import Base
+
+revision = "0001"
+down_revision = None
 branch_labels = None
 depends_on = None
 KEPT = "the log of acts only grows"
@@ -13,6 +15,8 @@ KEPT = "the log of acts only grows"
 
 def upgrade() -> None:
     """Make the tables of this version from those of the version before."""
+    # Until a version is released nobody has older tables. The first version after that states here what it found.
+    Base.metadata.create_all(op.get_bind())
     if op.get_bind().dialect.name == "sqlite":
         for what in ("UPDATE", "DELETE"):
             op.execute(
@@ -31,10 +35,7 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Make the tables of the version before."""
-    if op.get_bind().dialect.name == "sqlite":
-        for what in ("update", "delete"):
-            op.execute(f"DROP TRIGGER act_no_{what}")
-    else:
-        op.execute("DROP TRIGGER act_kept ON act")
+    """Remove the tables."""
+    Base.metadata.drop_all(op.get_bind())
+    if op.get_bind().dialect.name != "sqlite":
         op.execute("DROP FUNCTION act_is_kept()")
