@@ -54,6 +54,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
         "shield",
         "theory",
         "architecture",
+        "where",
         "design/index",
         "contributing",
         "benchmarks",

@@ -102,6 +102,8 @@ class Car:
     `w` is the nominal width in metres that sets the roads: lanes are 2w wide, roads 4w (paper, II.A). The body
     that collides is `body`. `model` is the name of the car model (`cars.dynamics`) or ``module:Class`` of a user's;
     `parameters` are the values given to it.
+
+    Norm: docs/rules.md#road.
     """
 
     w: float = 0.3

@@ -198,7 +198,10 @@ def _drive(b: int, n: int, until: float, state: State) -> Drive:
 
 @jit
 def _meet(b: int, i: int, j: int, begin: float, dt: float, motion: Motion) -> float:
-    """Return when, after `begin`, car i meets j, a car or obstacle part -1 - p, s; NEVER if not in this tick."""
+    """Return when, after `begin`, car i meets j, a car or obstacle part -1 - p, s; NEVER if not in this tick.
+
+    Norm: docs/rules.md#collision.
+    """
     state, cars, until = motion.state, motion.cars, motion.work.until
     one, drive = box_at(b, i, state, cars), _drive(b, i, until[i], state)
     if j < 0:

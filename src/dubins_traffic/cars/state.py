@@ -65,7 +65,10 @@ class Propositions(NamedTuple):
 
 
 class SensedCar(NamedTuple):
-    """Another car as a driver senses it."""
+    """Another car as a driver senses it.
+
+    Norm: docs/rules.md#observations.
+    """
 
     name: str
     index: int  # pyright: ignore[reportIncompatibleMethodOverride]  # no tuple is searched here

@@ -180,7 +180,10 @@ def missing(results: Sequence[Result], phase: Phase) -> list[int]:
 
 
 def value(row: Mapping[str, Any], metric: str) -> float:
-    """Return what a trial counts in a ranking."""
+    """Return what a trial counts in a ranking.
+
+    Norm: docs/rules.md#ranking.
+    """
     found = row[metric]
     if metric == "icra2016" and (found is None or row["end"] != End.DURATION):
         return COLLISION_SCORE

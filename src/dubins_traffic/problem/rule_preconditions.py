@@ -20,6 +20,8 @@ def check_demands(
 ) -> None:
     """Refuse a problem that asks for the rules where they are not defined.
 
+    Norm: docs/rules.md#room.
+
     Parameters
     ----------
     network : RoadNetwork

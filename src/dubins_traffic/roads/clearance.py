@@ -97,6 +97,8 @@ def _sharp(hub: Ints, step: Floats, segment: Ints, cosine: float) -> Ints:
     """Return intersections and pairs of segments that make an angle there whose cosine is not below `cosine`.
 
     `hub` (K,), ascending, are the intersections out of which roads lead in the direction `step` (K, 2).
+
+    Norm: docs/rules.md#arms.
     """
     step = step / _norm(step)[:, None]
     found: list[Ints] = []

@@ -26,6 +26,8 @@ def curve_faults(
     """Return where segments that bend are not straight near their ends, too sharp, or too close to others.
 
     Parameters are those of `roads.clearance.clearance_faults`.
+
+    Norm: docs/rules.md#curves.
     """
     chains = network.chains
     faults: list[InputError] = []

@@ -220,7 +220,10 @@ def valid_cell(t: RoadTable, net: int, x: float, y: float, radius: float, cell: 
 
 @jit_inline
 def lane_coordinates(t: RoadTable, net: int, lane: int, x: float, y: float) -> tuple[float, float]:
-    """Return (s, l) of a point: metres along a lane from its start, metres left of the segment's centre line."""
+    """Return (s, l) of a point: metres along a lane from its start, metres left of the segment's centre line.
+
+    Norm: docs/rules.md#segment.
+    """
     row: int = t.seg_off[net] + (lane >> 1)
     own = t.segment[row]
     if own.piece >= 0:

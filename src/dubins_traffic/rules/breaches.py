@@ -65,6 +65,8 @@ def judge_lane(
     """Judge rule 2: a car is left only while overtaking, and for at most `left_time` unless it is hemmed in.
 
     `bits` (FLAG) and `lane` are those of the car in this frame.
+
+    Norm: docs/rules.md#2.left, docs/rules.md#2.return.
     """
     car.left_since = run(bits & FLAG.LEFT != 0, tick, car.left_since)
     car.free_since = run(bits & (FLAG.LEFT | FLAG.HEMMED) == FLAG.LEFT, tick, car.free_since)
@@ -80,6 +82,8 @@ def judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, count: int, ta
     """Judge rule 3 for car n of trial b, which enters crossing v in this frame, by the frame before.
 
     The first `count` cars of `spacing.near` are all that may have been in the crossing then.
+
+    Norm: docs/rules.md#3.stop, docs/rules.md#3.order, docs/rules.md#3.clear.
     """
     log, near = tables.log, tables.spacing.near
     car = log.car[b, n]
@@ -96,7 +100,10 @@ def judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, count: int, ta
 
 @jit_inline
 def judge_turn(car: JudgedCar, bits: Any, lane: int, tick: int, log: BreachLog) -> None:
-    """Judge rule 2: a car turns round, or backs up so far, in discs only; `bits` (FLAG) are those in this frame."""
+    """Judge rule 2: a car turns round, or backs up so far, in discs only; `bits` (FLAG) are those in this frame.
+
+    Norm: docs/rules.md#2.turn.
+    """
     if bits & FLAG.TURNED != 0:
         add(log, car, RULE.TURN, tick, tick, -1, lane)
 
@@ -106,6 +113,8 @@ def judge_road(car: JudgedCar, on: bool, lane: int, tick: int, log: BreachLog) -
     """Judge rule 1 for the ego, E1 for an e-agent: after its first frame on the road a car stays there.
 
     `on` (bool) tells whether it is there in this frame.
+
+    Norm: docs/rules.md#1.road.
     """
     if on:
         car.off_road = -1
@@ -119,6 +128,8 @@ def judge_queue(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> Non
     """Judge E3 for car n of trial b, which has stopped at v.
 
     A car that is first at a clear crossing enters it in time, and takes few tickets.
+
+    Norm: docs/rules.md#E3.enter, docs/rules.md#E3.tickets.
     """
     log, terms, kept = tables.log, tables.terms[b], tables.memory.car[b, n]
     car, lane = log.car[b, n], tables.labels.lane[b, n]
@@ -136,6 +147,8 @@ def at_goal(goal: int, count: int, at: Ints, cars: Rows[JudgedCar]) -> int:
     """Return the e-agent that has been at a goal longest (E6), -1 if none is there.
 
     `at` (N,) are the discs that hold the centres of `cars` (N,); only the first `count` cars exist.
+
+    Norm: docs/rules.md#free.
     """
     who = -1
     for n in range(EGO + 1, count):

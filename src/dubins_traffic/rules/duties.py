@@ -47,7 +47,10 @@ def judge_agent(b: int, n: int, tick: int, tables: RefereeTables) -> int:
 
 @jit_inline
 def _judge_journey(b: int, n: int, tick: int, tables: RefereeTables) -> int:
-    """Judge E5 for e-agent n of trial b; return the tick in which to judge again if the car's labels stay the same."""
+    """Judge E5 for e-agent n of trial b; return the tick in which to judge again if the car's labels stay the same.
+
+    Norm: docs/rules.md#E5, docs/rules.md#journey.
+    """
     log, terms, labels = tables.log, tables.terms[b], tables.labels
     car = log.car[b, n]
     start = min(terms.start_ticks, terms.journey_ticks)
@@ -69,6 +72,8 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
 
     Ticks do not count while the ego, too, is in the disc and came there later, or, up to `shared_time`, in the same
     tick. Returns the tick in which to judge again if the car's labels stay the same.
+
+    Norm: docs/rules.md#E4, docs/rules.md#pause.
     """
     log, terms = tables.log, tables.terms[b]
     car, ego = log.car[b, n], log.car[b, EGO]
@@ -99,7 +104,10 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
 
 @jit_rare
 def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
-    """Tell whether car n of trial b is in a lane with a free way ahead (E5)."""
+    """Tell whether car n of trial b is in a lane with a free way ahead (E5).
+
+    Norm: docs/rules.md#way.
+    """
     state, roads, labels, row = tables.state, tables.roads, tables.labels, tables.memory.car[b]
     own, terms = tables.rules[b], tables.terms[b]
     lane = labels.lane[b, n]
@@ -159,6 +167,8 @@ def judge_goals(b: int, tick: int, tables: RefereeTables) -> None:
     """Judge E6 in trial b: no goal is taken for too long.
 
     Sets `BreachLog.goal_due`, the tick in which to judge again if no car comes or goes.
+
+    Norm: docs/rules.md#E6.
     """
     log, terms = tables.log, tables.terms[b]
     due = NEVER_DUE

@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 class Exceptions:
     """Counts the breaches of E1 (rules 1.road, 2 and 3) by the e-agents of one trial.
 
+    Norm: docs/rules.md#exceptions.
+
     Parameters
     ----------
     rules : RuleParameters

@@ -27,6 +27,8 @@ def way_back(v: int, came: int, t: RoadTable, own: TrialRules) -> int:
     """Return the segment by which a car came to v if v is a bend, where that segment is no exit for it; else -1.
 
     The car came by the lane `came` (-1: none).
+
+    Norm: docs/rules.md#exit.
     """
     return came // 2 if came >= 0 and _is_bend(v, t, own) else -1
 
@@ -46,6 +48,8 @@ def _takes(b: int, k: int, lane: int, along: float, lateral: float, tables: Refe
 
     `along` (m) and `lateral` (m) are its coordinates there. Its body narrows the lane, or its centre is in it and the
     car does not go toward the disc.
+
+    Norm: docs/rules.md#takes.
     """
     state, labels, roads, own = tables.state, tables.labels, tables.roads, tables.rules[b]
     if labels.segment[b, k] != lane // 2 or along <= 0.0:
@@ -59,7 +63,10 @@ def _takes(b: int, k: int, lane: int, along: float, lateral: float, tables: Refe
 
 @jit_inline
 def to_mouth(along: float, lateral: float, own: TrialRules, terms: RefereeParameters) -> float:
-    """Return the distance of (along, lateral) from the point where a lane leaves the disc at its beginning, metres."""
+    """Return the distance of (along, lateral) from the point where a lane leaves the disc at its beginning, metres.
+
+    Norm: docs/rules.md#mouth.
+    """
     far, aside = along - own.radius, lateral + terms.lane_middle
     return sqrt(far * far + aside * aside)
 
@@ -69,6 +76,8 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
     """Tell whether any lane out of v, except that on segment `back`, is free for car n of trial b.
 
     The first `count` cars of `spacing.near` are all that may be near.
+
+    Norm: docs/rules.md#free-exit.
     """
     t, own, terms = tables.roads, tables.rules[b], tables.terms[b]
     row = int(t.vert_off[own.net]) + v

@@ -25,6 +25,8 @@ def blamed(first: bool, second: bool, first_breaks: bool, second_breaks: bool) -
 def with_fault(contact: Contact, bits: Bits) -> Contact:
     """Return `contact` with `at_fault` filled in.
 
+    Norm: docs/rules.md#at-fault.
+
     Parameters
     ----------
     contact : Contact

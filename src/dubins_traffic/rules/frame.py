@@ -38,7 +38,10 @@ def label_frame(tick: int, tables: LabelTables) -> None:
 
 @jit
 def label_trial(b: int, tick: int, tables: LabelTables) -> None:
-    """Label frame `tick` of trial b."""
+    """Label frame `tick` of trial b.
+
+    Norm: docs/rules.md#order-in-a-frame.
+    """
     state, labels, memory = tables.state, tables.labels, tables.memory
     own, row, due = tables.rules[b], memory.car[b], memory.due[b]
     check_label_caches(b, tick, state, own, memory)
@@ -121,6 +124,8 @@ def _label_approach(b: int, n: int, tick: int, tables: LabelTables) -> Any:
     """Flag whether car n approaches a crossing and has stopped there; give it a ticket and enter it in the queue.
 
     Also sets CLEAR, which depends on all cars' discs. Returns the car's flags so far, with LEFT if it will be left.
+
+    Norm: docs/rules.md#clear, docs/rules.md#approach, docs/rules.md#stopped.
     """
     labels, memory = tables.labels, tables.memory
     own, row, head = tables.rules[b], memory.car[b], memory.head[b]
@@ -196,6 +201,8 @@ def _excuse(first: int, far: float, cars: Rows[CarMemory], bits: Any) -> None:
 
     The cars of the lane are listed in order from car `first`, the foremost, on. A car without lane state is never
     excused.
+
+    Norm: docs/rules.md#stands.
     """
     start = first
     n = first
@@ -222,7 +229,10 @@ def _with_stands(bits: Any) -> Any:
 
 @jit
 def _label_blocked(b: int, n: int, tick: int, tables: LabelTables) -> bool:
-    """Flag whether the lane of car n is blocked, whether it overtakes and whether it is left; return the last."""
+    """Flag whether the lane of car n is blocked, whether it overtakes and whether it is left; return the last.
+
+    Norm: docs/rules.md#left, docs/rules.md#blocked, docs/rules.md#overtaking.
+    """
     labels, t = tables.labels, tables.roads
     own, car = tables.rules[b], tables.memory.car[b, n]
     lane = labels.lane[b, n]

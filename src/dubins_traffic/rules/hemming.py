@@ -11,7 +11,10 @@ from dubins_traffic.rules.tables import LabelTables
 
 @jit_rare
 def hem_in(b: int, tick: int, tables: LabelTables) -> None:
-    """Flag the cars of trial b that are hemmed in, in a frame in which some car is left; `tables` (LabelTables)."""
+    """Flag the cars of trial b that are hemmed in, in a frame in which some car is left; `tables` (LabelTables).
+
+    Norm: docs/rules.md#hemmed.
+    """
     labels, row = tables.labels, tables.memory.car[b]
     cars: int = tables.state.count[b]
     for n in range(cars):

@@ -178,6 +178,8 @@ def note_growth(
     """Find whether car n, just located in `lane` (-1: none), lingers; `fresh`: that lane was set in this frame.
 
     `top` is its greatest progress, metres, which the caller has to write to `Memory.growth`.
+
+    Norm: docs/rules.md#lingers.
     """
     k = n & (BLOCK - 1)
     if lane < 0:

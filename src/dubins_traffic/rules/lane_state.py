@@ -68,6 +68,8 @@ def along_lane(
 ) -> tuple[int, float, float, bool]:
     """Return the new lane state: (lane, progress, lateral offset, whether it flipped).
 
+    Norm: docs/rules.md#lane-state.
+
     Parameters
     ----------
     t, net

@@ -49,6 +49,8 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
 
     HELD_FLAGS of the frame before are kept, and BREACH3 is judged by that frame's flags. Tells whether the disc that
     the body meets has changed, or is known for the first time.
+
+    Norm: docs/rules.md#on-road, docs/rules.md#at, docs/rules.md#cross.
     """
     state, t, labels, memory = tables.state, tables.roads, tables.labels, tables.memory
     own, car, cell, block = tables.rules[b], memory.car[b, n], memory.cell[b, n], memory.kept[b, n // BLOCK]
@@ -132,6 +134,8 @@ def _reach(
     Returns metres that a round body may move before it comes to where cars approach and queue, if the crossing is not
     v, the nearest vertex; 0 where it is there. And metres before the end of its lane up to which, along the lane, it
     certainly does not come there, if these are told apart from the first, which is then FARTHEST; else 0.
+
+    Norm: docs/rules.md#progress.
     """
     net = own.net
     round_body = own.half_length + own.half_width == 0.0
@@ -181,6 +185,8 @@ def _entry_flags(
     """Return HELD_FLAGS of the flags of the frame `before`, and the flags of the disc that the body meets.
 
     The body meets the disc of vertex `crosses` and met that of `crossed`, -1 for none; an entry is judged by `before`.
+
+    Norm: docs/rules.md#crossing, docs/rules.md#enter.
     """
     bits = before & HELD_FLAGS
     if crosses < 0:

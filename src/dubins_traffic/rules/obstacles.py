@@ -89,6 +89,8 @@ def on_bend(parts: Rows[Part], roads: RoadTable, row: int, half_width: float) ->
 
     A disc stays a disc. An edge becomes points at most `STEP` metres apart, joined by straight lines. Points off the
     road count as on the road's edge.
+
+    Norm: docs/rules.md#obstacle-on-a-bend.
     """
     own, found, beside = roads.segment[row], list[tuple[float, ...]](), set[int]()
     for p in range(len(parts)):

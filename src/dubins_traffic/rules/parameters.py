@@ -11,7 +11,10 @@ from typing import Any
 from dubins_traffic.errors import InputError
 
 EDITION = 2
-"""The edition of the rules of the road that is judged; edition 1 had no `lingers` and differed in E3 to E6."""
+"""The edition of the rules of the road that is judged; edition 1 had no `lingers` and differed in E3 to E6.
+
+Norm: docs/rules.md#edition.
+"""
 
 USUAL_W = 0.3
 """The half-lane width that the defaults of lengths are for, metres (docs/rules.md#scale)."""
@@ -145,7 +148,10 @@ class RuleParameters:
 
     @classmethod
     def for_width(cls, w: float) -> RuleParameters:
-        """Return the defaults on roads of half-lane width `w` (m): lengths, and `still_speed`, grow with it."""
+        """Return the defaults on roads of half-lane width `w` (m): lengths, and `still_speed`, grow with it.
+
+        Norm: docs/rules.md#scale.
+        """
         scale = w / USUAL_W
         usual = cls().to_mapping()
         lengths = {

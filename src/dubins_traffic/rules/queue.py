@@ -78,6 +78,8 @@ class Queue(NamedTuple):
 def rank_queue(t: RoadTable, net: int, queue: Queue, group_ticks: int) -> int:
     """Write the places of the members of a queue into their `rank`; return the index of the first car.
 
+    Norm: docs/rules.md#queue.
+
     Parameters
     ----------
     t, net
@@ -154,6 +156,8 @@ def keep_order(t: RoadTable, own: TrialRules, queue: Queue, clear: bool, tick: i
     """Order a queue; a member that forfeits its place gets the present tick as its new ticket.
 
     `clear` (bool) tells whether no car crosses the vertex.
+
+    Norm: docs/rules.md#forfeit.
     """
     cars = queue.cars
     front = rank_queue(t, own.net, queue, own.group_ticks)

@@ -52,6 +52,8 @@ class Breach(NamedTuple):
 
     `since` is the frame in which what led to it began. (x, y) is the centre of the car in frame `tick`, or the point
     of a contact; `vertex` the intersection that it is about and `lane` the car's lane state (-1: none).
+
+    Norm: docs/rules.md#breach.
     """
 
     rule: str
@@ -83,6 +85,8 @@ class Referee:
     """Judges a batch of trials, tick by tick, or the frames of one trial, block by block; the same code does both.
 
     Trials whose problem carries no rules are skipped.
+
+    Norm: docs/rules.md#poses.
 
     Parameters
     ----------
@@ -316,7 +320,10 @@ def breach_of(found: FoundBreach, x: float, y: float) -> Breach:
 
 
 def accused(contacts: Sequence[Contact]) -> list[Breach]:
-    """Return the breaches of rule 1 and E2 that contacts are: any contact of the ego, any e-agent's fault."""
+    """Return the breaches of rule 1 and E2 that contacts are: any contact of the ego, any e-agent's fault.
+
+    Norm: docs/rules.md#1.collision, docs/rules.md#E2.
+    """
     breaches: list[Breach] = []
     for contact in contacts:
         place = (contact.tick, contact.tick, contact.x, contact.y, NONE, NONE)

@@ -28,6 +28,8 @@ GRAIN = 1e-9
 
 The tolerance of docs/rules.md#tolerance. It is also added to the distance of `still` and taken from that of `lingers`,
 since cars often drive exactly that far and rounding must not decide.
+
+Norm: docs/rules.md#tolerance.
 """
 NEVER_AGAIN = 1e300
 """A tick, or a distance, that is never reached."""
@@ -268,7 +270,10 @@ class LabelTables(Tables):
 
 
 def ticks(duration: float, rate: float) -> int:
-    """Return the number of ticks of a duration in seconds (docs/rules.md#time): ceil(duration * rate - 1e-9)."""
+    """Return the number of ticks of a duration in seconds (docs/rules.md#time): ceil(duration * rate - 1e-9).
+
+    Norm: docs/rules.md#time.
+    """
     return math.ceil(duration * rate - 1e-9)
 
 

@@ -47,6 +47,8 @@ _OF_ENVIRONMENT = ("overtaking", "hemmed", "clear", "ahead")
 def task(problem: JudgedProblem, names: Sequence[str]) -> Specification:
     """Return the task: what is assumed of the e-agents, and what the ego must guarantee.
 
+    Norm: docs/rules.md#phi_sys, docs/rules.md#phi_env.
+
     Parameters
     ----------
     problem : Problem

@@ -15,7 +15,10 @@ from dubins_traffic.rules.propositions import FLAG
 
 @jit_rare
 def find_waiting(b: int, tick: int, tables: RefereeTables) -> None:
-    """Set `JudgedCar.waits` of the cars of trial b: the ego, and who waits for one that waits, and so on."""
+    """Set `JudgedCar.waits` of the cars of trial b: the ego, and who waits for one that waits, and so on.
+
+    Norm: docs/rules.md#waits.
+    """
     cars, log = tables.state.count[b], tables.log
     for n in range(cars):
         log.car[b, n].waits = 1 if n == EGO else 0

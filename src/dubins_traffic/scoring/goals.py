@@ -42,7 +42,10 @@ class GoalDiscs:
 
 
 class Rounds:
-    """Counts rounds: when all of `goals` goals are done, a round is counted and all become undone."""
+    """Counts rounds: when all of `goals` goals are done, a round is counted and all become undone.
+
+    Norm: docs/rules.md#round.
+    """
 
     def __init__(self, goals: int) -> None:
         self.count = 0
@@ -82,6 +85,8 @@ class Visiting:
 
     Between two visits of a goal its centre has been in the disc of another intersection. A round is complete when every
     goal has been visited since the last round; without goals there are none.
+
+    Norm: docs/rules.md#1.goal, docs/rules.md#visit.
     """
 
     def begin(self, instance: Instance) -> None:

@@ -145,7 +145,7 @@ def _find_margin(
 def _least_way_back(frames: Any, ego: Rows[EgoFrame], net: Any, turn_back: float, roads: RoadTable) -> float:
     """Return the least distance, metres, by which the ego could have backed farther without turning round.
 
-    It is negative, or 0, in a frame in which it turned; infinite without lane state. Norm: docs/rules.md#lane-state.
+    It is negative, or 0, in a frame in which it turned; infinite without a lane state (docs/rules.md#lane-state).
     """
     least = INFINITE
     reference = 0.0

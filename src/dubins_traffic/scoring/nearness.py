@@ -15,6 +15,8 @@ if TYPE_CHECKING:
 def is_near(breaches: Sequence[Breach], back: int, seen: Callable[[int, int], bool]) -> bool:
     """Tell whether each breach of the ego follows one of an e-agent that was near it.
 
+    Norm: docs/rules.md#near.
+
     Parameters
     ----------
     breaches

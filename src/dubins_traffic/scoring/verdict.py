@@ -211,6 +211,8 @@ def reach_verdict(
 ) -> Verdict:
     """Return the verdict on a trial.
 
+    Norm: docs/rules.md#violated, docs/rules.md#excused, docs/rules.md#satisfied, docs/rules.md#unfinished.
+
     Parameters
     ----------
     instance, rules
@@ -291,6 +293,10 @@ def _formulas(
     visited_now: Sequence[bool],
     running: Pending,
 ) -> dict[str, Status]:
+    """Return what can be said of each formula after the last frame, by name.
+
+    Norm: docs/rules.md#liveness.
+    """
     found: dict[str, Status] = dict.fromkeys(EGO_RULES, HELD)
     for rule in running.ego.intersection(EGO_RULES):
         found[rule] = PENDING
@@ -311,7 +317,10 @@ def _formulas(
 
 
 def assumption_of(rule: str) -> str:
-    """Return the part of the assumption that an e-agent breaks with a rule: E1 for 1.road, 2, 3 (docs/rules.md#E1)."""
+    """Return the part of the assumption that an e-agent breaks with a rule: E1 for 1.road, 2, 3 (docs/rules.md#E1).
+
+    Norm: docs/rules.md#E1.
+    """
     return rule[:2] if rule.startswith("E") else "E1"
 
 
