@@ -7,6 +7,8 @@ from __future__ import annotations
 
 from importlib import import_module
 
+from dubins_traffic.above import ABOVE
+
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # without the module `typing`: the program `dubins-traffic` hears Ctrl-C the sooner
     from typing import Any
@@ -170,6 +172,27 @@ def __getattr__(name: str) -> Any:
     value = getattr(import_module(f"{__name__}.{place}"), attribute)
     globals()[name] = value
     return value
+
+
+def _html_of(value: Any) -> str:
+    from dubins_traffic.viewer.notebook import html_of
+
+    return html_of(value)
+
+
+def _rows_of(value: Any) -> list[dict[str, Any]]:
+    from dubins_traffic.campaign.frames import rows_of
+
+    return rows_of(value)
+
+
+def _boxed(spec: str, limits: str) -> Any:
+    from dubins_traffic.sandbox.controller import named
+
+    return named(spec, limits)
+
+
+ABOVE.html_of, ABOVE.rows_of, ABOVE.boxed = _html_of, _rows_of, _boxed
 
 
 def __dir__() -> list[str]:

@@ -1,18 +1,12 @@
-"""What notebooks and data frames ask of a value, answered by rooms above the one in which the value is defined.
-
-A road network knows nothing of drawing, and a score nothing of tables of campaigns; imports only go down. So the
-classes here find those who can draw and tabulate by name, when they are asked.
-"""
+"""What notebooks and data frames ask of a value; rooms above the one in which it is defined answer (`above`)."""
 
 from __future__ import annotations
 
 from importlib import import_module
 from typing import Any
 
+from dubins_traffic.above import ABOVE
 from dubins_traffic.errors import MissingExtraError
-
-HTML = "dubins_traffic.viewer.notebook"
-TABLES = "dubins_traffic.campaign.frames"
 
 
 class Pictured:
@@ -21,7 +15,7 @@ class Pictured:
     __slots__ = ()
 
     def _repr_html_(self) -> str:
-        return import_module(HTML).html_of(self)
+        return ABOVE.html_of(self)
 
 
 class Tabulated:
@@ -37,7 +31,7 @@ class Tabulated:
         MissingExtraError
             If pandas is not installed.
         """
-        return data_frame(import_module(TABLES).rows_of(self))
+        return data_frame(ABOVE.rows_of(self))
 
 
 def data_frame(rows: Any) -> Any:

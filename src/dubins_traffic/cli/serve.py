@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -79,4 +80,5 @@ def serve(
         print(f"The proxy finds it at {url}", flush=True)
     if joining is not None:
         print(f"The first organiser joins at {joining}", flush=True)
-    serving.serve(office, opened, workers, trust=trust)
+    worker = (sys.executable, "-m", "dubins_traffic.cli", "worker")
+    serving.serve(office, opened, workers, worker, trust=trust)

@@ -7,6 +7,7 @@ import re
 from typing import Any, Final, cast
 
 from dubins_traffic import outside
+from dubins_traffic.above import ABOVE
 from dubins_traffic.controllers import blame
 from dubins_traffic.files import begins_with, is_file
 from dubins_traffic.outside import Seam
@@ -55,8 +56,7 @@ def load(spec: str) -> Controller:
     """Return a new controller, as `controllers.registry.load` does for names without a shield."""
     boxed = SANDBOX.search(spec)
     if boxed is not None:
-        module = importlib.import_module("dubins_traffic.sandbox.controller")
-        return cast(Controller, module.named(spec[: boxed.start()], boxed["limits"].lstrip(",")))
+        return cast(Controller, ABOVE.boxed(spec[: boxed.start()], boxed["limits"].lstrip(",")))
     if spec in BUILT_IN:
         return cast(Controller, getattr(_module(spec), BUILT_IN[spec][0])())
     if spec.endswith(".mcap"):

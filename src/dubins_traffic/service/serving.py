@@ -6,8 +6,8 @@ import os
 import signal
 import socket
 import subprocess
-import sys
 import threading
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
@@ -26,7 +26,6 @@ from dubins_traffic.service.tables import Account, Code, Token
 from dubins_traffic.service.web.app import create_app
 
 log = structlog.get_logger("dubins_traffic.service")
-WORKER = (sys.executable, "-m", "dubins_traffic.cli", "worker")
 WATCH_S = 1.0
 
 
@@ -108,11 +107,17 @@ def local_token(office: Office) -> str:
 
 
 class Workers(threading.Thread):
-    """Workers as processes of this machine; one that ends is replaced, and all end with this process."""
+    """Workers as processes of this machine; one that ends is replaced, and all end with this process.
 
-    def __init__(self, count: int, url: str, token: str, folder: Path, *, trust: bool = False) -> None:
+    `program` is the command of a worker, without its arguments.
+    """
+
+    def __init__(
+        self, count: int, program: Sequence[str], url: str, token: str, folder: Path, *, trust: bool
+    ) -> None:
         super().__init__(name="workers", daemon=True)
         self._count, self._url, self._token, self._folder = count, url, token, folder
+        self._program = program
         self._trust = trust
         self._stop_asked = threading.Event()
         self.processes: list[subprocess.Popen[bytes]] = []
@@ -143,7 +148,7 @@ class Workers(threading.Thread):
     def _launched(self, number: int) -> subprocess.Popen[bytes]:
         folder = self._folder / f"worker-{number}"
         command = [
-            *WORKER,
+            *self._program,
             self._url,
             "--name",
             f"{socket.gethostname()[:40]} {number}",
@@ -179,7 +184,9 @@ class Server(uvicorn.Server):
         super().handle_exit(sig, None)
 
 
-def serve(office: Office, opened: socket.socket, workers: int, *, trust: bool = False) -> None:
+def serve(
+    office: Office, opened: socket.socket, workers: int, program: Sequence[str], *, trust: bool = False
+) -> None:
     """Serve until this process is told to end.
 
     Parameters
@@ -190,6 +197,8 @@ def serve(office: Office, opened: socket.socket, workers: int, *, trust: bool = 
         Where to listen.
     workers : int
         How many workers to keep beside the server.
+    program : sequence of str
+        The command of a worker, without its arguments.
     trust : bool
         As for workers.
     """
@@ -202,7 +211,9 @@ def serve(office: Office, opened: socket.socket, workers: int, *, trust: bool = 
         log_level="warning",
         timeout_graceful_shutdown=10,
     )
-    beside = Workers(workers, address_of(opened), local_token(office), office.folder / "work", trust=trust)
+    beside = Workers(
+        workers, program, address_of(opened), local_token(office), office.folder / "work", trust=trust
+    )
     for number in (signal.SIGINT, signal.SIGTERM):  # the server raises them again when it has ended
         signal.signal(number, _nothing)
     keeper = Housekeeper(office)

@@ -1,0 +1,38 @@
+"""What rooms ask of rooms above them: who can draw a value, tabulate it, or drive a stranger's controller in a box.
+
+A road network knows nothing of drawing, a score nothing of tables of campaigns, the names of controllers nothing of
+boxes, since imports only go down. `dubins_traffic` says who answers when it is imported.
+"""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False
+if TYPE_CHECKING:  # without the module `typing`, as in the package itself
+    from collections.abc import Callable
+    from typing import Any
+
+
+def _nobody(*_asked: object) -> Any:
+    raise RuntimeError("nobody answers before dubins_traffic has been imported")
+
+
+class Above:
+    """Who answers.
+
+    Attributes
+    ----------
+    html_of
+        Returns the page, HTML, that a notebook shows of a value.
+    rows_of
+        Returns a value as rows of a table of trials, each a dict.
+    boxed
+        Returns the controller of a name, in a box with the limits of a text.
+    """
+
+    def __init__(self) -> None:
+        self.html_of: Callable[[Any], str] = _nobody
+        self.rows_of: Callable[[Any], list[dict[str, Any]]] = _nobody
+        self.boxed: Callable[[str, str], Any] = _nobody
+
+
+ABOVE = Above()
