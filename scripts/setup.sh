@@ -39,8 +39,11 @@ if ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
 fi
 echo "setup: installing dubins-traffic[$extra] into .venv"
 .venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt --editable ".[$extra]"
-# On all processors, as pip doesn't; but for what nobody here imports, a third of it, which would be compiled when it is.
+# On all processors, as pip doesn't, where processes can share a lock: a chroot without /dev/shm has none. What nobody here
+# imports, a third of it, is left out, and would be compiled when it is imported.
 # Some packages hold files that are no Python, at which this ends with another status.
-.venv/bin/python -m compileall -qq -j 0 -x "/(tests|rllib|tune|serve|train|dashboard|devtools)/|/faker/providers/" .venv/lib || true
+jobs=0
+.venv/bin/python -c 'import multiprocessing; multiprocessing.Lock()' 2>/dev/null || jobs=1
+.venv/bin/python -m compileall -qq -j "$jobs" -x "/(tests|rllib|tune|serve|train|dashboard|devtools)/|/faker/providers/" .venv/lib || true
 touch ".venv/.installed-$extra"
 if [ "$extra" = dev ]; then touch .venv/.installed-plot; fi

@@ -57,6 +57,29 @@ def test_every_test_has_a_limit_at_which_it_is_ended(pytestconfig: pytest.Config
     assert 0 < float(pytestconfig.getini("timeout")) <= 3600
 
 
+PYTHON = """#!/bin/sh
+echo "$@" >>asked
+case "$*" in *multiprocessing*) exit {status} ;; esac
+"""
+
+
+@pytest.mark.parametrize(("status", "jobs"), [(0, "-j 0"), (1, "-j 1")])
+def test_it_is_installed_where_processes_share_no_lock(status: int, jobs: str, tmp_path: Path) -> None:
+    """A chroot has often no /dev/shm: compiling on all processors ended with a traceback there."""
+    python = tmp_path / ".venv" / "bin" / "python"
+    script = tmp_path / "scripts" / "setup.sh"
+    for path, text in (
+        (python, PYTHON.format(status=status)),
+        (script, (ROOT / "scripts/setup.sh").read_text()),
+    ):
+        path.parent.mkdir(parents=True)
+        path.write_text(text)
+        path.chmod(0o755)
+    subprocess.run([script, "plot"], check=True, capture_output=True)
+    (line,) = [one for one in (tmp_path / "asked").read_text().splitlines() if "compileall" in one]
+    assert jobs in line
+
+
 def test_all_that_is_pinned_installs_with_the_python_of_debian_12() -> None:
     lines = (ROOT / "constraints.txt").read_text().splitlines()
     pinned = {canonicalize_name(line.partition("==")[0]) for line in lines if "==" in line}

@@ -241,11 +241,3 @@ def test_trials_of_a_slow_controller_are_kept_one_by_one(tmp_path: Path) -> None
     whole = succeed(file, out, "--workers", "2", "--resume")
     assert len((tmp_path / "begun").read_text()) == begun + 48 - before
     assert succeed(file, tmp_path / "again", "--workers", "1") == whole
-
-
-def test_a_mistyped_folder_holds_nothing_to_go_on_with(tmp_path: Path) -> None:
-    file = written(tmp_path, campaign())
-    done = run(file, tmp_path / "mistyped", "--resume")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "mistyped: nothing to go on with; expected a folder that holds a campaign" in done.stderr
-    assert not (tmp_path / "mistyped").exists()

@@ -137,6 +137,29 @@ def test_no_default_name_replaces_anything_either() -> None:
         assert [main(words), main(words), main([*words, "--overwrite"])] == [0, 2, 0]
 
 
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["campaign", "run", "c.toml"],
+        ["falsify", "demo", "--controller", "simple"],
+        ["suite", "run", "rules-2026", "--controller", "simple"],
+        ["suite", "run", "adversary-2026", "--controller", "simple"],
+        ["suite", "run", "synthesis-2026"],
+    ],
+    ids=" ".join,
+)
+def test_a_mistyped_folder_holds_nothing_to_go_on_with(
+    words: list[str], place: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (place / "c.toml").write_text(
+        'version = 0\ntrials = 1\ncontrollers = ["simple"]\nconfigurations = ["demo"]\n'
+    )
+    assert main([*words, "-o", "mistyped", "--resume"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "mistyped: nothing to go on with; expected a folder that holds" in line
+    assert not (place / "mistyped").exists()
+
+
 def test_two_outputs_are_two_files(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = held(place)
     assert main(["synth", "one.json", "-o", "a.npz", "--graph", "a.npz"]) == 2
