@@ -55,8 +55,6 @@ from dubins_traffic.rules.propositions import FLAG
 
 BUMPER = 0.005
 """Gap that a tailgating car, which trusts the one ahead not to brake, keeps behind it while it moves, metres."""
-DAWDLE = 0.12
-"""Speed at which a nemesis drives in front of the ego, m/s."""
 
 
 @jit
@@ -257,7 +255,7 @@ def dawdle(b: int, n: int, speed: float, to_go: float, near: int, traffic: Traff
     car = drivers.car[b, n]
     passes = car.aside != 0.0
     if car.kind == KIND.NEMESIS and not passes and before_ego(b, n, near, traffic):
-        speed = min(speed, DAWDLE)
+        speed = min(speed, traffic.drivers.vehicle[b].dawdle)
     if car.pause > 0.0 and pauses(b, n, to_go, labels, traffic):
         speed = 0.0
     if car.hold > 0.0 and labels.at[b, n] == lane_end(roads, drivers.net[b], car.lane):
