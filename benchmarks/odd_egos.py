@@ -4,7 +4,8 @@
     python -m benchmarks.odd_egos [TRIALS] [JOBS] [FIRST]
 
 Each trial is 120 s. Of two trials one is on a grid, with up to a third of its segments removed, the other on a random
-network of 6 to 24 intersections. One in three has obstacles in and beside the lanes, also just behind intersections.
+network of 6 to 24 intersections. One in three has obstacles in and beside the lanes, just behind intersections too, but
+none that bars a goal or the way to it.
 There are 1 to 7 e-agents: `lawful` ones that wander, loop or go between places; in one trial of four a `nemesis` is
 among them, and one of sixteen has a team `counter`. The kinds of `benchmarks.odd_drivers` take turns. A trial in which
 the ego is not clean does not count.
@@ -13,6 +14,7 @@ the ego is not clean does not count.
 from __future__ import annotations
 
 import math
+import re
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -24,11 +26,14 @@ from benchmarks.drawing import random_roads, random_trial
 from benchmarks.odd_drivers import KINDS
 from benchmarks.rules import e_agents
 from benchmarks.table import Row, show
+from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import run_trial
 
+BARRING = re.compile(r"obstacles\[(\d+)\]")
+"""The field of a refusal of an obstacle that bars a goal or the way to it; it is left out."""
 DURATION = 120.0
 SEED = 2016
 TRIALS = 2000
@@ -66,11 +71,19 @@ def instance(number: int, seconds: float = DURATION) -> Instance:
     agents = e_agents("nemesis" if nemesis else "lawful", draws.between(1, 7), draws)
     if team:
         agents = [{"type": "counter", "name": f"car{k}"} for k in range(2)]
-    more: dict[str, Any] = {}
+    obstacles: list[dict[str, Any]] = []
     if blocked and not team:
         bare = random_trial(network, agents, seconds, SEED, number, rules=True)
-        more["obstacles"] = _obstacles(bare, draws)
-    return random_trial(network, agents, seconds, SEED, number, rules=True, **more)
+        obstacles = _obstacles(bare, draws)
+    while True:
+        try:
+            more = {"obstacles": obstacles} if blocked and not team else {}
+            return random_trial(network, agents, seconds, SEED, number, rules=True, **more)
+        except InputError as error:
+            barring = BARRING.fullmatch(error.field or "")
+            if barring is None:
+                raise
+            del obstacles[int(barring[1])]
 
 
 def _grid(draws: Draws, small: bool) -> dict[str, Any]:

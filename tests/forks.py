@@ -53,6 +53,7 @@ def configuration(kinds: Mapping[str, Any] | Any, world: str, rules: bool, secon
         "rules": {
             "linger_time": 0.5,
             "rest_time": 0.2,
+            "journey_start_time": 0.2,
             "exit_time": 4.0,
             "enter_time": 0.4,
             "forfeit_time": 0.5,

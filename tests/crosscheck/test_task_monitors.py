@@ -67,6 +67,7 @@ QUICK = {
     "enter_time": 3.5,
     "exit_time": 2.0,
     "rest_time": 4.0,
+    "journey_start_time": 4.0,
     "goal_time": 5.0,
     "goal_gap": 0.0,
 }

@@ -40,7 +40,7 @@ GRID = {"grid": {"rows": 3, "columns": 3, "length": 4.0}}
 
 HURRY = {
     "linger_time": 0.5, "rest_time": 0.2, "exit_time": 4.0, "goal_time": 1.0, "shared_time": 0.3, "forfeit_time": 0.5,
-    "enter_time": 0.4, "stand_time": 0.2, "stop_time": 0.2,
+    "enter_time": 0.4, "stand_time": 0.2, "stop_time": 0.2, "journey_start_time": 0.2,
 }  # fmt: skip
 """Rules that are soon broken: E3 to E6 too."""
 

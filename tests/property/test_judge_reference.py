@@ -26,7 +26,14 @@ from tests.rules_scripts import KITE, STAR, TURNED_STAR, fill, moved, on_lane, w
 
 GRID = RoadNetwork.grid(2, 3, 3.5)
 BOX = Car(body=Rectangle(0.5, 0.26))
-QUICK = {"left_time": 2.0, "enter_time": 4.0, "exit_time": 1.5, "rest_time": 2.0, "goal_time": 4.0}
+QUICK = {
+    "left_time": 2.0,
+    "enter_time": 4.0,
+    "exit_time": 1.5,
+    "rest_time": 2.0,
+    "journey_start_time": 2.0,
+    "goal_time": 4.0,
+}
 
 
 def trial(roads: RoadNetwork, cars: int, seed: int, car: Car | None = None) -> Instance:

@@ -355,7 +355,7 @@ def test_e5_a_bend_is_no_free_way_that_is_full_or_has_the_ego_in_it(roads: RoadN
     assert found(far, after(roads, two, 0.3)) == []
     assert found(far, after(roads, two, 0.3, 0.3)) == late
     assert found(after(roads, two, -EPS), beyond) == []
-    assert found(after(roads, two, -EPS), beyond, way_distance=0.3) == late
+    assert found(after(roads, two, -EPS), beyond, way_distance=0.3, blocked_ahead=0.3) == late
     assert found(far, after(roads, two, -EPS, 0.3)) == late
 
 

@@ -24,6 +24,11 @@ def beyond(gap: float, radius: float = 1.0) -> float:
     return math.sqrt((radius + gap) ** 2 - W * W)
 
 
+def beyond_line(gap: float, aside: float, radius: float = 1.0) -> float:
+    """Return how far along its lane a centre is `gap` (m) beyond the disc, `aside` (m) of the centre line."""
+    return math.sqrt((radius + gap) ** 2 - aside**2)
+
+
 def drawn(document: dict[str, Any], trial: int, **more: Any) -> Instance:
     """Return a trial of a configuration with more fields."""
     return draw(load_config({**document, **more}), 1, trial)
@@ -70,3 +75,34 @@ def test_a_goal_may_be_taken_while_a_queue_from_the_ego_fills_its_exit() -> None
         "rules": {"crossing_degree": 1},
     }
     assert breaches(run_trial(drawn(road, 0), Stands()).score) == []
+
+
+TILTS = (0.0, 0.3, 0.6, 0.9, 1.2, 1.5)
+
+
+@pytest.mark.parametrize("rate", [10.0, 30.0])
+@pytest.mark.parametrize("gap", [0.26, 0.4, 0.6])
+@pytest.mark.parametrize("toward", [True, False])
+def test_cars_pass_one_that_stands_tilted_at_the_centre_line_beside_a_bend(
+    rate: float, gap: float, toward: bool
+) -> None:
+    """36 places at each rate; at 10 Hz what it may reach in a tick lies in the middle of the lane out of the bend."""
+    length, width, over = 0.4, 0.25, 0.04
+    for tilt in TILTS:
+        aside = 0.5 * (math.sin(tilt) * length + math.cos(tilt) * width) - over
+        far = beyond_line(gap, aside)
+        start = [far, aside, math.pi + tilt] if toward else [far, -aside, tilt]
+        square = {
+            "version": 1,
+            "problem_domain": "dubins_traffic",
+            "network": {"grid": {"rows": 2, "columns": 2, "length": 4.0}},
+            "car": {"body": {"rectangle": {"length": length, "width": width}}},
+            "e-agents": [{"type": "lawful", "name": "car", "count": 4}],
+            "ego": {"start": start},
+            "goals": [[0, 0], [1, 1]],
+            "number_trials": 1,
+            "duration": 40.0,
+            "rate": rate,
+            "rules": True,
+        }
+        assert breaches(run_trial(drawn(square, 0), Stands()).score) == [], tilt

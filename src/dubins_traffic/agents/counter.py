@@ -14,7 +14,7 @@ from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.records import table
-from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.fitness import check_fit, check_speeds
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.room import MARGIN
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Drivers, Traffic, scratch
@@ -68,6 +68,7 @@ class CounterTeam:
         (instance,) = instances
         problem = instance.problem
         check_fit(problem, owes=False)
+        check_speeds(instance)
         self._roads = pack([problem.network], [problem.car.lane_width])
         self._obstacles = pack_obstacles([problem.obstacles])
         self._drivers = _drivers(instance)

@@ -14,7 +14,7 @@ from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, numbers, stack, table
-from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.fitness import check_fit, check_speeds
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
@@ -44,6 +44,7 @@ class Lawful:
         for instance in instances:
             if any(agent.driver.kind in KEEP_RULES for agent in instance.e_agents):
                 check_fit(instance.problem, owes=True)
+                check_speeds(instance)
         roads, net = pack_distinct(
             [instance.problem.network for instance in instances],
             [instance.problem.car.lane_width for instance in instances],

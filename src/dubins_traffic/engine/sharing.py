@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.body import DUBINS
 from dubins_traffic.errors import InputError
-from dubins_traffic.policies.rules.fitness import check_fit
+from dubins_traffic.policies.rules.fitness import check_fit, check_speeds
 from dubins_traffic.problem.kinds import ALONE, KEEP_RULES
 
 if TYPE_CHECKING:
@@ -43,6 +43,7 @@ def _is_fit(instance: Instance) -> bool:
         check_fit(instance.problem, owes=False)
         if lawful:
             check_fit(instance.problem, owes=True)
+            check_speeds(instance)
     except InputError:
         return False
     return True

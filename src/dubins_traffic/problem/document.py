@@ -23,6 +23,7 @@ from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import Kind, detect, parse_json, plain, read_source
 from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.problem.obstructions import check_obstructions
 from dubins_traffic.problem.parts import CarModel, ObstacleModel
 from dubins_traffic.problem.rule_preconditions import check_demands
 from dubins_traffic.problem.settings import INSTANCE_0_KEYS, InstanceModel, InstanceModel0
@@ -157,6 +158,7 @@ def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: 
         formulas=model.formulas,
     )
     check_formulas(problem, names)
+    check_obstructions(problem)
     planned, ego = _placed(model, network, planned)
     wishes = [ego, *agent_wishes(network, planned, agents, car, problem.obstacles)]
     ground = Ground(network, car, model.radius, problem.obstacles)

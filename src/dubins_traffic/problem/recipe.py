@@ -21,6 +21,7 @@ from dubins_traffic.problem.drawing import (
 )
 from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
+from dubins_traffic.problem.obstructions import check_obstructions
 from dubins_traffic.problem.rule_preconditions import check_demands
 from dubins_traffic.problem.starts import Areas, Ground, Wish, areas_of, check_given, draw_starts
 from dubins_traffic.roads.clearance import LEAST_RADIUS, SEGMENT_SLACK
@@ -99,6 +100,7 @@ class Recipe:
             formulas=settings.formulas,
         )
         check_formulas(problem, self._names)
+        check_obstructions(problem)
         if starts is None:
             starts = draw_starts(
                 self._areas(site), site.ground, site.wishes, Draws(seed, trial, Stream.STARTS)

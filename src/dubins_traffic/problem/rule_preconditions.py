@@ -33,7 +33,8 @@ def check_demands(
     sensing_radius : float
         Metres.
     rules : Mapping
-        The parameters `segment_slack` and `sensing_slack`, metres.
+        The parameters `segment_slack`, `sensing_slack` and `queue_distance`, metres: who waits at another arm of a
+        crossing is at most the last from the disc, and has to be seen.
 
     Raises
     ------
@@ -41,7 +42,7 @@ def check_demands(
         Naming the place: segment, intersection or setting.
     """
     reach = car.body.reach
-    sight = 2.0 * (radius + reach + rules["sensing_slack"])
+    sight = 2.0 * (radius + reach + max(rules["sensing_slack"], rules["queue_distance"]))
     if sensing_radius < sight - SLACK:
         raise InputError(
             "the rules are not defined here: sees too little",

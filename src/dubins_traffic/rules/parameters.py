@@ -18,6 +18,26 @@ Norm: docs/rules.md#edition.
 
 USUAL_W = 0.3
 """The half-lane width that the defaults of lengths are for, metres (docs/rules.md#scale)."""
+_IN_ORDER = (
+    ("left_release", "left_set", "left_release", "`left` would be cleared before it is set"),
+    ("approach_distance", "queue_distance", "queue_distance", "`stopped` would be lost where it is gained"),
+    ("blocked_ahead", "overtaking_ahead", "overtaking_ahead", "`overtaking` would end where it begins"),
+    ("blocked_ahead", "way_distance", "way_distance", "who is `blocked` would have a free way (E5)"),
+    ("stop_time", "stand_time", "stand_time", "who stops before a crossing would stand before it is excused"),
+    (
+        "journey_start_time",
+        "rest_time",
+        "journey_start_time",
+        "a journey would be too long before anything excuses it (E5)",
+    ),
+)
+"""Pairs of parameters of which the first must not be greater, which of them is to blame, and what were wrong."""
+_MORE_THAN_NOTHING = {
+    "approach_distance": "nobody could stop before a crossing (rule 3)",
+    "enter_time": "nobody could enter a crossing in time (E3)",
+    "forfeit_time": "who is first at a crossing would lose its place at once (E3)",
+}
+"""Parameters that must not be 0, and what were wrong."""
 NO_LENGTHS = ("_time", "_rounds", "_lengths")
 """Ends of the names of fractional parameters that are no lengths, nor lengths by second."""
 
@@ -131,20 +151,14 @@ class RuleParameters:
             if field.name.startswith("assume_") and getattr(self, field.name) > 1:
                 value = getattr(self, field.name)
                 raise InputError("not a switch", field=field.name, value=value, expected="0 or 1")
-        if self.left_release > self.left_set:
-            raise InputError(
-                "`left` would be cleared before it is set",
-                field="left_release",
-                value=self.left_release,
-                expected=f"at most left_set ({self.left_set})",
-            )
-        if self.queue_distance < self.approach_distance:
-            raise InputError(
-                "`stopped` would be lost where it is gained",
-                field="queue_distance",
-                value=self.queue_distance,
-                expected=f"at least approach_distance ({self.approach_distance})",
-            )
+        for name, problem in _MORE_THAN_NOTHING.items():
+            if getattr(self, name) == 0:
+                raise InputError(problem, field=name, value=0, expected="a number > 0")
+        for least, most, blamed, problem in _IN_ORDER:
+            low, high = getattr(self, least), getattr(self, most)
+            if low > high:
+                expected = f"at least {least} ({low})" if blamed == most else f"at most {most} ({high})"
+                raise InputError(problem, field=blamed, value=getattr(self, blamed), expected=expected)
 
     @classmethod
     def for_width(cls, w: float) -> RuleParameters:

@@ -22,6 +22,12 @@ SIGHT, WIDE_SIGHT = 3.0, 10.0
 """Distance up to which other bodies matter to a car's next tick: the greater of metres and units of w."""
 
 
+DAWDLE = 0.12
+"""Speed at which a nemesis drives in front of the ego, m/s, where E5 allows it."""
+IN_TIME = 0.9
+"""Share of the time that E5 allows for a journey in which a car drives the longest segment at its least speed."""
+
+
 @jit_inline
 def turns_within_road(tightest: float, middle: float) -> bool:
     """Tell whether a car can turn round from lane to lane in a disc, and comes back at once into a lane it has left.
@@ -48,3 +54,11 @@ def through_speed(problem: Problem) -> float:
     longest = LONGEST_WAY * (problem.intersection_radius + problem.car.body.reach)
     allowed = RuleParameters.from_mapping(problem.rules).exit_time
     return longest / (PROMPT * allowed) if allowed > 0.0 else problem.car.bounds.speed
+
+
+def least_speed(problem: Problem) -> float:
+    """Return the speed at which the longest segment takes IN_TIME of the time that E5 allows for a journey, m/s."""
+    rules = RuleParameters.from_mapping(problem.rules)
+    longest = float(problem.network.lengths.max())
+    allowed = rules.rest_time + rules.journey_lengths * longest / problem.car.bounds.speed
+    return longest / (IN_TIME * allowed) if allowed > 0.0 else problem.car.bounds.speed

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
+from functools import cache
 from math import inf, pi
 from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.body import Disc
 from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.errors import InputError
-from dubins_traffic.policies.rules.abilities import LONGEST_WAY, ROUND
+from dubins_traffic.policies.rules.abilities import LONGEST_WAY, ROUND, least_speed
 from dubins_traffic.policies.rules.wide_turns import check_wide_turns
+from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, parameters_of
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.rules.parameters import RuleParameters
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.instance import Problem
+    from dubins_traffic.problem.instance import Instance, Problem
 
 KEPT = "the rules of the road and the shield are kept by standing at once, with no stopping distance (docs/shield.md),"
 """Why other cars than the Dubins car are refused."""
@@ -63,6 +65,37 @@ def check_fit(problem: Problem, owes: bool) -> None:
     if not problem.rules:
         for fault in clearance_faults(problem.network, problem.intersection_radius, car.body.reach, car.w):
             raise fault
+
+
+def check_speeds(instance: Instance) -> None:
+    """Refuse e-agents of ours that are too slow for what E5 gives every car, by the top speed of the problem's cars.
+
+    Raises
+    ------
+    InputError
+        Naming the e-agent's speed.
+    """
+    problem = instance.problem
+    if not problem.rules or not RuleParameters.from_mapping(problem.rules).assume_e5:
+        return
+    least = min(least_speed(problem), problem.car.bounds.speed)
+    for n, agent in enumerate(instance.e_agents):
+        driver = agent.driver
+        if driver.kind not in KEEP_RULES and driver.kind != COUNTER:
+            continue
+        speed = driver.parameters.get("speed", _usual_speed(driver.kind))
+        if speed < least:
+            raise InputError(
+                f"{agent.name} is too slow to come to an intersection in time (E5)",
+                field=f"e-agents[{n}].parameters.speed",
+                value=speed,
+                expected=f"at least {least:.6g} m/s on these roads",
+            )
+
+
+@cache
+def _usual_speed(kind: str) -> float:
+    return parameters_of(kind, {})["speed"]
 
 
 def _check_times(problem: Problem) -> None:

@@ -26,6 +26,7 @@ from dubins_traffic.policies.rules.command_cache import (
     repeat_command,
 )
 from dubins_traffic.policies.rules.exits import count_visit, take_lane, ticks_of, watch_ego
+from dubins_traffic.policies.rules.leaning import lean, leans
 from dubins_traffic.policies.rules.lists import LISTED, enlist, unlist_cars
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import PASSING_WAIT, find_way_past, keep_off
@@ -54,8 +55,6 @@ from dubins_traffic.rules.propositions import FLAG
 
 BUMPER = 0.005
 """Gap that a tailgating car, which trusts the one ahead not to brake, keeps behind it while it moves, metres."""
-DAWDLE = 0.12
-"""Speed at which a nemesis drives in front of the ego, m/s."""
 
 
 @jit
@@ -183,6 +182,8 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         speed, kept = follow(b, n, speed, gap, who, rides, part, way, traffic)
     speed = dawdle(b, n, speed, -way_to_go(way, x, y), near, traffic)
     speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
+    if close and offset == 0.0 and car.aside == 0.0 and leans(vehicle):
+        offset = lean(b, way, near, traffic)
     if leaves:
         find_way_out(b, n, tick, part, traffic)
     bend = way.bend if part == PART.THROUGH else 0.0
@@ -254,7 +255,7 @@ def dawdle(b: int, n: int, speed: float, to_go: float, near: int, traffic: Traff
     car = drivers.car[b, n]
     passes = car.aside != 0.0
     if car.kind == KIND.NEMESIS and not passes and before_ego(b, n, near, traffic):
-        speed = min(speed, DAWDLE)
+        speed = min(speed, traffic.drivers.vehicle[b].dawdle)
     if car.pause > 0.0 and pauses(b, n, to_go, labels, traffic):
         speed = 0.0
     if car.hold > 0.0 and labels.at[b, n] == lane_end(roads, drivers.net[b], car.lane):

@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable, pack_cars
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.policies.rules.abilities import near_of, sight_of, through_speed
+from dubins_traffic.policies.rules.abilities import DAWDLE, least_speed, near_of, sight_of, through_speed
 from dubins_traffic.policies.rules.kept import KeptCommands, KeptPath
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.judged import distinct_problems
@@ -212,6 +212,8 @@ class Vehicle:
     """How near to a crossing a car takes its place in the order, metres."""
     goal_time: float
     """Within how many seconds every goal has to be free once (E6)."""
+    dawdle: float
+    """Speed at which a nemesis drives in front of the ego, m/s."""
 
 
 @record
@@ -304,8 +306,14 @@ def scratch(cars: int, segments: int, obstacles: ObstacleTable) -> Scratch:
 def vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
     """Return `Drivers.vehicle`."""
     kinds, index = distinct_problems(problems)
-    rows: Any = _vehicles_of(kinds)
-    return rows[index]
+    made: Any = _vehicles_of(kinds)
+    rows = made[index]
+    first, alike = distinct(
+        [(own, id(problem.network)) for own, problem in zip(index, problems, strict=True)]
+    )
+    least = np.array([least_speed(problems[k]) for k in first])
+    rows["dawdle"] = np.maximum(DAWDLE, least)[alike]
+    return rows
 
 
 def _vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:

@@ -1,0 +1,48 @@
+"""Driving farther right past a body beside the lane, where a tick is long (compiled).
+
+`policies.safety` keeps what another may reach in a tick. At low control rates that is more than lies between a car in
+the middle of its lane and one that stands at the centre line, yet the lane is free (docs/rules.md#free-exit).
+"""
+
+from __future__ import annotations
+
+from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.policies.rules.narrow import EDGE
+from dubins_traffic.policies.rules.seeing import SIDE
+from dubins_traffic.policies.rules.tables import Traffic, Vehicle
+from dubins_traffic.policies.rules.turn_arcs import ReferencePath, on_way
+from dubins_traffic.policies.safety import GUARD, travel_of
+from dubins_traffic.rules.shape import half_extent
+
+
+@jit_inline
+def leans(vehicle: Vehicle) -> bool:
+    """Tell whether a car in the middle of its lane can't pass one that reaches over the line as far as it may."""
+    beside = vehicle.middle - vehicle.half_width - vehicle.rounding - vehicle.over
+    return beside < travel_of(vehicle) + GUARD
+
+
+@jit
+def lean(b: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
+    """Return how far left of its way a car drives past the bodies left of it, 0 or less, metres.
+
+    Its centre stays on the road. `near` (count) cars are listed.
+    """
+    state, scratch, vehicle = traffic.state, traffic.scratch, traffic.drivers.vehicle[b]
+    clear = vehicle.half_width + vehicle.rounding + travel_of(vehicle) + GUARD + SIDE
+    offset = 0.0
+    for k in range(near):
+        j = scratch.near[k]
+        _, _, left, px, py = on_way(way, state.x[b, j], state.y[b, j])
+        half = half_extent(
+            px,
+            py,
+            float(state.c[b, j]),
+            float(state.s[b, j]),
+            vehicle.half_length,
+            vehicle.half_width,
+            vehicle.rounding,
+        )
+        if 0.0 < left < 4.0 * vehicle.middle:
+            offset = min(offset, left - half - clear)
+    return max(offset, EDGE - vehicle.middle)
