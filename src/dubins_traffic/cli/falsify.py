@@ -32,9 +32,9 @@ REGRESS_EXAMPLES = options.examples("regress found --controller my_controller.py
 RulesOption = Annotated[
     list[str] | None,
     typer.Option(
-        "--rule", metavar="R", show_default="all but 1.goal",
-        help="A rule that is asked for, such as 3.clear, or 1.goal: a goal is not visited for too long; may be given "
-        "several times.",
+        "--rule", metavar="R", show_default="the rules",
+        help="A rule that is asked for, such as 3.clear; 1.goal: a goal is not visited for too long; blocked: no goal "
+        "is, and nobody has broken a rule; provoked: a lawful e-agent breaks one first. May be given several times.",
     ),
 ]  # fmt: skip
 FormulaOption = Annotated[

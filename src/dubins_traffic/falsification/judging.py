@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.falsification import contract
 from dubins_traffic.falsification.case import Case, Story
 from dubins_traffic.falsification.liveness import first_overdue, spare
 from dubins_traffic.falsification.remote import Remote
@@ -42,8 +43,13 @@ class Judged:
     tried: Tried
 
     def breach(self, rule: str) -> Violation | None:
-        """Return the ego's first breach of a rule if the trial is `violated` and all keep E1 to E6, else None."""
+        """Return the ego's first breach of a rule if the trial is `violated` and all keep E1 to E6, else None.
+
+        Of `contract.CONTRACT` that of the car that is concerned.
+        """
         verdict = self.score.verdict
+        if rule in contract.CONTRACT:
+            return self.first(rule)
         if verdict is None or verdict.assumption_broken:
             return None
         if rule not in EGO_RULES:
@@ -55,6 +61,9 @@ class Judged:
         verdict, frames = self.score.verdict, self.record.frames
         if rule == LIVENESS:
             return self._overdue()
+        if rule in contract.CONTRACT:
+            ticks = [tick for cell, tick in self.tried.cells if cell.rule == rule]
+            return contract.breach_of(rule, ticks[0], verdict, self.record) if verdict and ticks else None
         own = () if verdict is None else verdict.violations
         for broken in own:
             if broken.car == EGO_NAME and broken.rule == rule:
@@ -99,7 +108,7 @@ def judge(instance: Instance, make: Make, name: str) -> Judged:
     again = instance_from_document(document)
     record = make.drive(again) if isinstance(make, Remote) else _recorded(again, make, name)
     found, passages = judged_record(record)
-    return Judged(record, found, tried_of(found, record.ending, passages, 0, record.frames.rate))
+    return Judged(record, found, tried_of(found, record.ending, passages, 0, record.instance))
 
 
 def _recorded(instance: Instance, make: Maker, name: str) -> Record:

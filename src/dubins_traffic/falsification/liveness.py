@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.falsification.contract import CONTRACT
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import replay
 from dubins_traffic.rules.parameters import RuleParameters
@@ -23,8 +24,8 @@ if TYPE_CHECKING:
     from dubins_traffic.record.reader import Record
     from dubins_traffic.scoring.verdict import Verdict
 
-TARGETS: Final = (*EGO_RULES, LIVENESS)
-"""What can be asked for by name: the rules, and the goals."""
+TARGETS: Final = (*EGO_RULES, LIVENESS, *CONTRACT)
+"""What can be asked for by name: the rules, the goals, and the contract."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,8 +55,8 @@ def first_overdue(record: Record, limit: float) -> Overdue | None:
     return visits.found()
 
 
-def check_long_enough(instances: Sequence[Instance]) -> None:
-    """Refuse trials none of which lasts as long as a gap may.
+def check_long_enough(instances: Sequence[Instance], target: str) -> None:
+    """Refuse trials none of which lasts as long as a gap may; `target` is what is asked for.
 
     Raises
     ------
@@ -71,7 +72,7 @@ def check_long_enough(instances: Sequence[Instance]) -> None:
     ]
     least = min(limits, default=math.inf)
     if not math.isfinite(least):
-        raise InputError("has no goals that can be visited", file="--rule", value=LIVENESS)
+        raise InputError("has no goals that can be visited", file="--rule", value=target)
     longest = max(own.duration for own in instances)
     if longest <= least:
         raise InputError(

@@ -49,6 +49,8 @@ class Passages:
         What the ego did, and how many roads meet in the disc, or in the one at the end of the road.
     in_disc : (P,) bool
         Whether it leads through a disc.
+    disc : (P,) int64
+        The intersection whose disc that is; -1 on roads, and for who has never left the disc.
     flags : (P,) int64
         The flags of `rules.propositions` that held of the ego in a frame of the stretch, and `BARRED`.
     before : (P,) int64
@@ -61,6 +63,7 @@ class Passages:
     manoeuvre: Ints
     degree: Ints
     in_disc: Bools
+    disc: Ints
     flags: Ints
     before: Ints
 
@@ -79,6 +82,22 @@ class Passages:
                 return Cell(rule, Manoeuvre.ENTERING, int(self.degree[row]))
             row += 1
         return Cell(rule, Manoeuvre(int(self.manoeuvre[row])), int(self.degree[row]))
+
+    def last(self, trial: int) -> int:
+        """Return the last frame of a trial."""
+        return int(self.end[np.searchsorted(self.trial, trial, side="right") - 1]) - 1
+
+    def visits(self, trial: int, goals: frozenset[int]) -> list[int]:
+        """Return the frames in which the ego comes into the disc of one of `goals`, from another disc or at first."""
+        rows = np.flatnonzero((self.trial == trial) & self.in_disc)
+        discs: list[int] = self.disc[rows].tolist()
+        first: list[int] = self.first[rows].tolist()
+        before = [-2, *discs][: len(discs)]
+        return [
+            tick
+            for tick, disc, last in zip(first, discs, before, strict=True)
+            if disc in goals and disc != last
+        ]
 
     def situations(self, trials: int) -> list[tuple[int, ...]]:
         """Return for each of `trials` trials the numbers of the situations in it, ascending.
@@ -152,7 +171,8 @@ def find_passages(
     place, held, ends = place[kept], held[kept], ends[kept]
     trial, first = place // width, place % width
     own = whole.ravel()[place]
-    manoeuvre, degree = _manoeuvres(trial, own, held, _ground(networks))
+    ground = _ground(networks)
+    manoeuvre, degree = _manoeuvres(trial, own, held, ground)
     fresh = np.append(True, trial[1:] != trial[:-1])
     return Passages(
         trial,
@@ -161,6 +181,7 @@ def find_passages(
         manoeuvre,
         degree,
         own < 0,
+        _discs(trial, own, ground),
         held,
         np.where(fresh, 0, np.roll(held, 1)),
     )
@@ -174,6 +195,10 @@ class _Ground:
     """Degree of the intersection at the end of each lane."""
     tail: Ints
     """That of the intersection at its beginning."""
+    into: Ints
+    """The intersection at the end of each lane."""
+    out_of: Ints
+    """That at its beginning."""
     tangent: npt.NDArray[np.float64]
     base: Ints
     """Number of the first lane of each trial."""
@@ -182,11 +207,11 @@ class _Ground:
 def _ground(networks: Sequence[RoadNetwork]) -> _Ground:
     distinct = {id(network): network for network in networks}
     tables = [_lanes(network) for network in distinct.values()]
-    sizes = np.cumsum([0, *(len(head) for head, _, _ in tables)])
+    sizes = np.cumsum([0, *(len(own[0]) for own in tables)])
     base = dict(zip(distinct, sizes.tolist(), strict=False))
-    heads, tails, tangents = zip(*tables, strict=True)
     place = np.array([base[id(network)] for network in networks])
-    return _Ground(np.concatenate(heads), np.concatenate(tails), np.concatenate(tangents), place)
+    head, tail, into, out_of, tangent = [np.concatenate(own) for own in zip(*tables, strict=True)]
+    return _Ground(head, tail, into, out_of, tangent, place)
 
 
 def _held(flags: Ints, wanted: int) -> Bools:
@@ -194,26 +219,42 @@ def _held(flags: Ints, wanted: int) -> Bools:
     return (flags & wanted) != 0
 
 
-def _lanes(network: RoadNetwork) -> tuple[Ints, Ints, npt.NDArray[np.float64]]:
-    """Return the degrees at the end and at the beginning of each lane, and its direction; kept with the network."""
+def _lanes(network: RoadNetwork) -> tuple[npt.NDArray[Any], ...]:
+    """Return the first columns of `_Ground` for the lanes of a network; they are kept with it."""
     found = network.known.get(_LANES)
     if found is None:
         ends = network.degrees[network.ends]
         head = np.stack([ends[:, 1], ends[:, 0]], axis=1).ravel()
         tail = np.stack([ends[:, 0], ends[:, 1]], axis=1).ravel()
         tangent = np.stack([network.tangents, -network.tangents], axis=1).reshape(-1, 2)
-        found = network.known[_LANES] = head, tail, tangent
+        into, out_of = network.ends[:, ::-1].ravel(), network.ends.ravel()
+        found = network.known[_LANES] = head, tail, into, out_of, tangent
     return found  # pyright: ignore[reportReturnType]  # what stands under our own key
 
 
 _LANES = "falsify lanes"
 
 
-def _manoeuvres(trial: Ints, lane: Ints, flags: Ints, ground: _Ground) -> tuple[Ints, Ints]:
-    """Return manoeuvre and degree of each stretch."""
+def _discs(trial: Ints, lane: Ints, ground: _Ground) -> Ints:
+    """Return through the disc of which intersection each stretch leads, -1 if through none, or if none is known."""
+    came, goes = _neighbours(trial, lane)
+    base = ground.base[trial]
+    into = np.where(came >= 0, ground.into[np.maximum(came, 0) + base], -1)
+    out_of = np.where(goes >= 0, ground.out_of[np.maximum(goes, 0) + base], -1)
+    return np.where(lane < 0, np.where(into >= 0, into, out_of), -1)
+
+
+def _neighbours(trial: Ints, lane: Ints) -> tuple[Ints, Ints]:
+    """Return the lane states of the stretches before and after each one of the same trial, -1 for none."""
     same = trial[1:] == trial[:-1]
     came = np.append(-1, np.where(same, lane[:-1], -1))
     goes = np.append(np.where(same, lane[1:], -1), -1)
+    return came, goes
+
+
+def _manoeuvres(trial: Ints, lane: Ints, flags: Ints, ground: _Ground) -> tuple[Ints, Ints]:
+    """Return manoeuvre and degree of each stretch."""
+    came, goes = _neighbours(trial, lane)
     base = ground.base[trial]
     before, after, own = (np.where(which < 0, 0, which) + base for which in (came, goes, lane))
     t0, t1 = ground.tangent[before], ground.tangent[after]

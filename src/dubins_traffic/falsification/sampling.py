@@ -12,6 +12,7 @@ import numpy as np
 
 from dubins_traffic.agents import choices
 from dubins_traffic.falsification import moves
+from dubins_traffic.falsification.contract import CAPRICIOUS
 from dubins_traffic.falsification.genome import Genome
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw_many
@@ -26,8 +27,6 @@ CHOSEN: Final = "chosen"
 DURATION: Final = 15.0
 """Seconds of a trial of a search, unless it is told otherwise."""
 MOST_LEGS: Final = 12
-CAPRICIOUS: Final = ("rolls", "left", "blocks", "tailgates", "parks")
-"""Parameters by which a car that keeps the law breaks it; one that has any of them stays as it is."""
 ONE: Final = 0.6
 """Share of the trials that differ from their parent in one change only."""
 STREAM: Final = 0xFA1
@@ -80,10 +79,12 @@ class Source:
         What they are drawn from, `prepared`.
     seed : int
         What all follows from.
+    frees : bool
+        Whether e-agents of the kind `lawful` that break nothing are to choose (`CHOSEN`).
     """
 
-    def __init__(self, configuration: Configuration, seed: int) -> None:
-        self._configuration, self._seed = configuration, seed
+    def __init__(self, configuration: Configuration, seed: int, *, frees: bool = True) -> None:
+        self._configuration, self._seed, self._frees = configuration, seed, frees
         self._words = [STREAM, seed & WORD, seed >> 32] if seed > WORD else [STREAM, seed]
         self._movable = moves.movable(configuration)
         self._known: dict[int, Instance] = {}
@@ -109,6 +110,8 @@ class Source:
 
     def _free(self, instance: Instance) -> Instance:
         """Return an instance whose e-agents may choose; those of several instances are often the same objects."""
+        if not self._frees:
+            return instance
         if instance.e_agents is not self._freed[0]:
             self._freed = instance.e_agents, tuple([_freed(agent) for agent in instance.e_agents])
         own, agents = self._freed

@@ -19,6 +19,7 @@ from dubins_traffic.falsification import archive as archives
 from dubins_traffic.falsification.archive import Archive
 from dubins_traffic.falsification.case import Case
 from dubins_traffic.falsification.cells import Cell
+from dubins_traffic.falsification.contract import PROVOKED
 from dubins_traffic.falsification.counts import Counts
 from dubins_traffic.falsification.coverage import Row, coverage, possible
 from dubins_traffic.falsification.coverage_page import coverage_page
@@ -271,7 +272,8 @@ def falsify(
         What is found is kept here; made if missing.
     rules : sequence of str
         The rules that are asked for, such as ``3.clear``; by default all that a trial of any length can break.
-        ``1.goal`` asks for goals that are not visited for longer than ``satisfied`` allows.
+        ``1.goal`` asks for goals that are not visited for longer than ``satisfied`` allows, ``blocked`` for no visit at
+        all for so long before anybody has broken a rule, ``provoked`` for a first breach by a `lawful` e-agent.
     formula : str, optional
         A formula of one's own that is asked for instead, one that a finite trial can break.
     least_score : bool
@@ -315,7 +317,7 @@ def falsify(
         "configuration": hashlib.sha256(json.dumps(own.to_document(), sort_keys=True).encode()).hexdigest(),
         "controller": name, "targets": list(targets), "seed": seed, "strategy": strategy,
     }  # fmt: skip
-    source = Source(own, seed)
+    source = Source(own, seed, frees=PROVOKED not in targets)
     check_targets(targets, source)
     proposing = make(strategy, source, targets)
     with (

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import EGO
+from dubins_traffic.falsification import contract
 from dubins_traffic.rules.propositions import FLAG
 
 if TYPE_CHECKING:
@@ -36,6 +37,8 @@ def sentence_of(record: Record, score: Score, breach: Violation) -> str:
             return f"{when} was still left of the centre line of {_road(breach)}, {since}."
         case "2.turn":
             return f"{when} turned round on {_road(breach)}."
+        case rule if rule in contract.CONTRACT:
+            return contract.sentence_of(score.verdict, breach)
         case "1.goal":
             since = f"since {breach.since:.2f} s" if breach.since > 0.0 else "yet"
             return f"{when} had not visited the goal {_crossing(breach)} {since}, which is longer than a gap may be."

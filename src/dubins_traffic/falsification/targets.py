@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Final
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.falsification.contract import BLOCKED, CONTRACT, PROVOKED, check_lawful
 from dubins_traffic.falsification.liveness import TARGETS, check_long_enough
 from dubins_traffic.falsification.trying import DONE, FORMULA
 from dubins_traffic.logic.formula import propositions
@@ -48,13 +49,16 @@ def check_targets(targets: Sequence[str], source: Source) -> None:
     Raises
     ------
     InputError
-        If goals are asked for and no trial lasts as long as a gap may, or a formula that can always still come true.
+        If goals are asked for and no trial lasts as long as a gap may, cars that keep the law where there are none, or
+        a formula that can always still come true.
     """
-    if not {LIVENESS, f"{FORMULA} {ASKED}"}.intersection(targets):
+    if not {LIVENESS, *CONTRACT, f"{FORMULA} {ASKED}"}.intersection(targets):
         return
     instances = source.draw(range(LOOKED_AT))
-    if LIVENESS in targets:
-        check_long_enough(instances)
+    for target in {LIVENESS, BLOCKED}.intersection(targets):
+        check_long_enough(instances, target)
+    if PROVOKED in targets:
+        check_lawful(instances)
     problem = instances[0].problem
     for name, text in problem.formulas.items():
         formula = parse(text)

@@ -19,6 +19,7 @@ from dubins_traffic.engine.group import Group
 from dubins_traffic.engine.lanes_together import LanesTogether
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
 from dubins_traffic.falsification.cells import Cell, Manoeuvre
+from dubins_traffic.falsification.contract import Kept, kept
 from dubins_traffic.falsification.liveness import spare
 from dubins_traffic.falsification.passages import Passages, find_passages
 from dubins_traffic.falsification.remote import Remote
@@ -61,10 +62,11 @@ class Tried:
     margins : dict
         How far the ego stayed from breaking each rule, by the rules' names, and of each formula of the problem's own
         ("formula NAME"), and in seconds the longest gap of a goal from its limit (`LIVENESS`); what nothing could break
-        is left out. Negative: broken. `DONE`: what the ego got done, rounds,
-        then the share of the goals visited, then metres.
+        is left out; and those of the contract (`contract.Kept`). Negative: broken. `DONE`: what the ego got done,
+        rounds, then the share of the goals visited, then metres.
     cells : tuple of (Cell, int)
-        The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame.
+        The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame;
+        and the frames in which the contract was broken, of discarded trials too.
     situations : tuple of int
         What it met with (`passages.Passages.situations`); empty where nobody asks for it.
     fault : str
@@ -225,8 +227,7 @@ class Laboratory:
         frames = np.array([outcome.ending.ticks + 1 for outcome in outcomes])
         networks = [own.problem.network for own in group.instances]
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
-        rate = group.instances[0].problem.rate
-        tried = [tried_of(own.score, own.ending, passages, b, rate) for b, own in enumerate(outcomes)]
+        tried = [tried_of(own.score, own.ending, passages, b, own.instance) for b, own in enumerate(outcomes)]
         whole = with_passages(tried, passages, group.instances[0])
         return {places[id(own.instance)]: came for own, came in zip(outcomes, whole, strict=True)}
 
@@ -273,8 +274,10 @@ def judged_record(record: Record) -> tuple[Score, Passages]:
     return score(record), trace.passages()
 
 
-def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int, rate: float) -> Tried:
-    """Return what a search keeps of a trial that has been judged: number `trial` of `passages`, at `rate` Hz."""
+def tried_of(
+    score: Score, ending: Ending | None, passages: Passages, trial: int, instance: Instance
+) -> Tried:
+    """Return what a search keeps of the trial of an instance that has been judged: number `trial` of `passages`."""
     verdict = score.verdict
     fault = str(ending) if ending is not None and ending.end in FAULTS else ""
     margins = {
@@ -292,17 +295,21 @@ def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int
         margins[rule] = min(margins.get(rule, -0.0), BROKEN)
     assumption_broken = verdict.assumption_broken
     if not assumption_broken:
+        rate = instance.problem.rate
         first |= {rule: round(time * rate) for rule, time in broken_formulas(score).items()}
         first |= {LIVENESS: ending.ticks} if ending is not None and late is not None and late < 0.0 else {}
     discarded = verdict.verdict is Ruling.EXCUSED or (not own and assumption_broken)
+    contract = Kept() if fault else kept(verdict, passages, trial, instance)
+    margins |= contract.margins
+    first = contract.frames if discarded else first | contract.frames
     ordered = sorted(first.items(), key=lambda item: (item[1], item[0]))
-    cells = () if discarded else tuple((passages.cell(rule, trial, tick), tick) for rule, tick in ordered)
+    cells = tuple((passages.cell(rule, trial, tick), tick) for rule, tick in ordered)
     return Tried(discarded, bool(fault), margins, cells, fault=fault)
 
 
 def _tried_alone(instance: Instance, found: Score, ending: Ending | None, passages: Passages) -> Tried:
     """Return what came of a trial that was run alone."""
-    tried = tried_of(found, ending, passages, 0, instance.problem.rate)
+    tried = tried_of(found, ending, passages, 0, instance)
     return with_passages([tried], passages, instance)[0]
 
 

@@ -1,0 +1,154 @@
+"""Both sides of the contract as what a search looks for: the ego kept waiting, or a car that keeps the law provoked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Final
+
+import numpy as np
+
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.errors import InputError
+from dubins_traffic.problem.kinds import KEEP_RULES
+from dubins_traffic.scoring.margins import SURE
+from dubins_traffic.scoring.verdict import EGO_NAME, Place, Violation
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from dubins_traffic.falsification.passages import Passages
+    from dubins_traffic.problem.instance import EAgent, Instance
+    from dubins_traffic.record.reader import Record
+    from dubins_traffic.scoring.verdict import Verdict
+
+BLOCKED: Final = "blocked"
+"""The ego visits no goal at all for longer than a gap may be, and nobody has broken anything."""
+PROVOKED: Final = "provoked"
+"""An e-agent that keeps the law breaks it, and nobody has broken anything before."""
+CONTRACT: Final = (BLOCKED, PROVOKED)
+CAPRICIOUS: Final = ("rolls", "left", "blocks", "tailgates", "parks")
+"""Parameters by which a car that keeps the law breaks it."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kept:
+    """What came of the contract in a trial.
+
+    Attributes
+    ----------
+    margins : dict of str to float
+        Of `BLOCKED` by how many seconds the longest wait stayed below its limit, where the trial is longer than that;
+        of `PROVOKED` 1 where no such car broke anything. Negative where it was not kept.
+    frames : dict of str to int
+        The frames in which it was broken.
+    """
+
+    margins: dict[str, float] = field(default_factory=dict[str, float])
+    frames: dict[str, int] = field(default_factory=dict[str, int])
+
+
+def keeps_law(agent: EAgent) -> bool:
+    """Tell whether an e-agent drives as the law says and chooses nothing of its own."""
+    parameters: Mapping[str, Any] = agent.parameters
+    return agent.kind in KEEP_RULES and not any(
+        parameters.get(name) for name in (*CAPRICIOUS, "choices")
+    )  # fmt: skip
+
+
+def kept(verdict: Verdict, passages: Passages, trial: int, instance: Instance) -> Kept:
+    """Return what came of the contract in number `trial` of `passages`, the trial of an instance, by its verdict."""
+    found = Kept()
+    provoked = provocation(verdict, instance)
+    if provoked is not None or any(keeps_law(agent) for agent in instance.e_agents):
+        found.margins[PROVOKED] = 1.0 if provoked is None else -1.0
+    if provoked is not None:
+        found.frames[PROVOKED] = provoked.tick
+    wait = _longest_wait(verdict, passages, trial, instance)
+    if wait is not None:
+        spare, tick = wait
+        found.margins[BLOCKED] = spare
+        if spare < 0.0:
+            found.frames[BLOCKED] = tick
+    return found
+
+
+def provocation(verdict: Verdict, instance: Instance) -> Violation | None:
+    """Return the breach of a car that keeps the law, if it is among the first of all and the ego's is not."""
+    first = verdict.violations[0].tick if verdict.violations else -1
+    at_first = [own for own in verdict.violations if own.tick == first]
+    lawful = {agent.name for agent in instance.e_agents if keeps_law(agent)}
+    if any(own.car == EGO_NAME for own in at_first):
+        return None
+    return next((own for own in at_first if own.car in lawful), None)
+
+
+def _longest_wait(
+    verdict: Verdict, passages: Passages, trial: int, instance: Instance
+) -> tuple[float, int] | None:
+    """Return by how much the longest time without a visit stayed below its limit, s, and the frame in which it was up.
+
+    None without a limit, and of a trial that is not longer. Time counts while nobody has broken anything.
+    """
+    limit, rate = verdict.gap_limit_s, instance.problem.rate
+    if limit is None or instance.duration <= limit:
+        return None
+    allowed = _ticks(limit, rate)
+    last = min([max(own.tick - 1, 0) for own in verdict.violations], default=passages.last(trial))
+    visits = passages.visits(trial, frozenset(instance.problem.goal_vertices))
+    marks = [0, *(tick for tick in visits if 0 < tick <= last), last]
+    gaps = np.diff(marks)
+    longest = int(gaps.max())
+    if longest <= allowed:
+        return max(limit - longest / rate, SURE), last
+    late = marks[int(np.argmax(gaps > allowed))] + allowed + 1
+    return min(limit - longest / rate, -SURE), late
+
+
+def breach_of(target: str, tick: int, verdict: Verdict, record: Record) -> Violation:
+    """Return a breach of the contract, in a frame of a record, as one of the car that is concerned."""
+    frames = record.frames
+    if target == PROVOKED:
+        found = provocation(verdict, record.instance)
+        if found is not None:
+            return Violation(target, found.car, found.time, found.tick, found.since, found.where)
+    x, y = float(frames.x[tick, EGO]), float(frames.y[tick, EGO])
+    since = tick - 1 - _ticks(verdict.gap_limit_s or 0.0, frames.rate)
+    return Violation(
+        target, EGO_NAME, tick / frames.rate, tick, since / frames.rate, Place(x, y, None, None)
+    )  # fmt: skip
+
+
+def _ticks(limit: float, rate: float) -> int:
+    """Return how many ticks a time without a visit may have."""
+    return math.floor(limit * rate + 1e-9)
+
+
+def sentence_of(verdict: Verdict | None, breach: Violation) -> str:
+    """Return who did what when in a trial in which the contract was broken."""
+    when = f"At {breach.time:.2f} s"
+    if breach.rule == BLOCKED:
+        return (
+            f"{when} the ego had visited no goal since {breach.since:.2f} s, though nobody had broken a rule."
+        )
+    broken = (
+        []
+        if verdict is None
+        else [o.rule for o in verdict.violations if o.tick == breach.tick and o.car == breach.car]
+    )
+    return f"{when} {breach.car}, which keeps the law, broke {' and '.join(broken)}, though the ego had broken nothing."
+
+
+def check_lawful(instances: Sequence[Instance]) -> None:
+    """Refuse trials in which no e-agent keeps the law.
+
+    Raises
+    ------
+    InputError
+        If there is none.
+    """
+    if not any(keeps_law(agent) for own in instances for agent in own.e_agents):
+        raise InputError(
+            "has no e-agents that keep the law", file="--rule", value=PROVOKED,
+            expected="e-agents of the kind lawful or nemesis",
+        )  # fmt: skip

@@ -1,0 +1,71 @@
+"""The suite that every change of the norm must pass: agents that try to block the ego, egos that try to provoke.
+
+The e-agents of `tests.contract_scenes.BLOCKING` stand in the way of the ego `rules`. Until one of them has broken a
+rule, the ego may not be without a visit for longer than a bound: all of them together may take the longest journey each
+(E5) and the longest stay in a goal (E6), and so may whoever waits for them. The egos of `PROVOKING` are among `lawful`
+cars, and as long as they have broken nothing, these break nothing.
+
+``DUBINS_TRAFFIC_CONTRACT=full`` runs 2,000 trials of 300 s.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+
+import pytest
+
+from tests.contract_blocking import BLOCKING
+from tests.contract_provoking import PROVOKING
+from tests.contract_scenes import SCENES, Came, trial
+
+FULL = os.environ.get("DUBINS_TRAFFIC_CONTRACT") == "full"
+NUMBERS = tuple(range(2000 // len(SCENES) + 1)) if FULL else tuple(range(4))
+FELL = {"disc_edge_out": (7, 8), "before_obstacle": (9,), "head_on": (7, 12, 13), "ego_tilted": (10, 14, 16)}
+"""Trials beyond the first ones in which the bar once did not hold."""
+SECONDS = 300.0 if FULL else None
+BLOCKS = {
+    "disc_edge_out": "a car over the edge of a bend's disc owes nothing while the ego waits in the disc behind it",
+    "head_on": "a car on the left owes nothing while the ego stands behind it",
+    "before_obstacle": "a car before an obstacle owes nothing, and the ego may lack the room to pass both",
+    "ring": "cars that wait for one another round a ring owe nothing",
+}
+"""Scenes in which e-agents that break nothing still block the ego."""
+PROVOKES = {
+    "ego_tilted": "a lawful car doesn't dare to leave a bend past an ego that stands tilted at the centre line",
+}
+"""Scenes in which a clean ego still brings a lawful car to a breach."""
+
+
+def _came(name: str) -> list[Came]:
+    """Return what came of the trials of a scene."""
+    numbers = sorted({*NUMBERS, *FELL.get(name, ())})
+    if not FULL:
+        return [trial(name, number) for number in numbers]
+    with ProcessPoolExecutor() as pool:
+        return list(pool.map(partial(trial, name, seconds=SECONDS), numbers))
+
+
+def _marked(names: list[str], known: dict[str, str]) -> list[object]:
+    """Return the names of scenes, those that are `known` to fail as such."""
+    return [
+        pytest.param(name, marks=pytest.mark.xfail(reason=known[name], strict=False))
+        if name in known
+        else name
+        for name in names
+    ]
+
+
+@pytest.mark.parametrize("name", _marked(list(BLOCKING), BLOCKS))
+def test_who_blocks_the_ego_breaks_a_rule(name: str) -> None:
+    came = _came(name)
+    assert [one for one in came if one.own] == []
+    assert [one for one in came if one.waited > one.bound] == []
+
+
+@pytest.mark.parametrize("name", _marked(list(PROVOKING), PROVOKES))
+def test_no_clean_ego_brings_a_lawful_car_to_a_breach(name: str) -> None:
+    came = _came(name)
+    assert any(not one.own for one in came)
+    assert [one for one in came if one.others and not one.own] == []

@@ -1,0 +1,214 @@
+"""Small drivers that block or provoke, as e-agents (``tests.contract_drivers:Swings``) and, by `AsEgo`, as egos."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from random import Random
+from typing import Any, ClassVar
+
+from dubins_traffic.cars.state import Command, Observation, Pose
+from dubins_traffic.controllers.rules import Rules
+from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.rules.propositions import FLAG
+
+SLACK = 0.03
+"""A point is reached within this distance, metres."""
+
+
+class Driver:
+    """The base of all: stands."""
+
+    parameters: ClassVar[Mapping[str, Any]] = {}
+
+    def begin(self, instance: Instance, car: int, parameters: Mapping[str, Any]) -> None:  # noqa: ARG002  # as all e-agents
+        """Begin as e-agent number `car`."""
+        self.prepare(instance.problem, parameters)
+
+    def prepare(self, problem: Problem, parameters: Mapping[str, Any]) -> None:
+        """Take the problem and the parameters; defaults are filled in."""
+        self.problem, self.own = problem, parameters
+        self.start: Pose | None = None
+
+    def act(self, seen: Observation) -> tuple[float, float]:
+        """Choose speed and yaw rate."""
+        if self.start is None:
+            self.start = seen.pose
+        return self.drive(seen)
+
+    def drive(self, seen: Observation) -> tuple[float, float]:  # noqa: ARG002  # others look
+        """Choose speed and yaw rate; by default it stands."""
+        return 0.0, 0.0
+
+    def gone(self, seen: Observation) -> float:
+        """Return how far it is from where it started, along the way it looked then, metres."""
+        assert self.start is not None
+        x, y = seen.pose.x - self.start.x, seen.pose.y - self.start.y
+        return x * self.start.c + y * self.start.s
+
+    def speed_to(self, far: float) -> float:
+        """Return the speed that goes as far in a tick, m/s."""
+        most = self.problem.car.bounds.speed
+        return max(-most, min(most, far * self.problem.rate))
+
+
+class Stands(Driver):
+    """Stands where it starts."""
+
+
+class Swings(Driver):
+    """Goes to and fro along its way: `back` metres behind its start in the first half of each period, then returns.
+
+    It waits `after` seconds before the first time; a negative `back` begins ahead. It moves toward nobody who is close.
+    """
+
+    parameters: ClassVar = {"back": 0.31, "period": 8.0, "after": 0.0, "speed": 0.3}
+
+    def drive(self, seen: Observation) -> tuple[float, float]:
+        time = seen.time - self.own["after"]
+        there = time >= 0.0 and time % self.own["period"] < 0.5 * self.own["period"]
+        speed = self.speed_to((-self.own["back"] if there else 0.0) - self.gone(seen))
+        speed = max(-self.own["speed"], min(self.own["speed"], speed))
+        return 0.0 if self._is_toward(seen, speed) else speed, 0.0
+
+    def _is_toward(self, seen: Observation, speed: float) -> bool:
+        """Tell whether a speed brings it closer to a car that is close, as far as these may come in a tick."""
+        reach = 2.0 * self.problem.car.body.reach + 2.0 * self.problem.car.bounds.speed / self.problem.rate
+        for other in seen.others:
+            x, y = other.pose.x - seen.pose.x, other.pose.y - seen.pose.y
+            if math.hypot(x, y) < reach and (x * seen.pose.c + y * seen.pose.s) * speed > 0.0:
+                return True
+        return False
+
+
+class Crawls(Driver):
+    """Drives straight on at a speed for a distance, then stands."""
+
+    parameters: ClassVar = {"speed": 0.06, "far": 1.0}
+
+    def drive(self, seen: Observation) -> tuple[float, float]:
+        return min(self.own["speed"], self.speed_to(max(self.own["far"] - self.gone(seen), 0.0))), 0.0
+
+
+class Spins(Driver):
+    """Turns on the spot, to and fro by `angle` radians at `rate` rad/s."""
+
+    parameters: ClassVar = {"angle": 1.0, "rate": 1.0}
+
+    def drive(self, seen: Observation) -> tuple[float, float]:
+        half = self.own["angle"] / self.own["rate"]
+        return 0.0, self.own["rate"] if seen.time % (2.0 * half) < half else -self.own["rate"]
+
+
+class Tours(Driver):
+    """Goes from point to point for ever, turning on the spot, and waits at each for as long as its third number says.
+
+    It does not move while a car is close before it, unless it is `rude`.
+    """
+
+    parameters: ClassVar = {"points": (), "speed": 0.7, "gap": 0.5, "rude": False}
+
+    def prepare(self, problem: Problem, parameters: Mapping[str, Any]) -> None:
+        super().prepare(problem, parameters)
+        self.next, self.until = 0, -1.0
+
+    def drive(self, seen: Observation) -> tuple[float, float]:
+        points: Sequence[Sequence[float]] = self.own["points"]
+        x, y, wait = points[self.next]
+        dx, dy = x - seen.pose.x, y - seen.pose.y
+        far = math.hypot(dx, dy)
+        if far < SLACK:
+            self.until = seen.time + wait if self.until < 0.0 else self.until
+            if seen.time >= self.until:
+                self.next, self.until = (self.next + 1) % len(points), -1.0
+            return 0.0, 0.0
+        turn = math.atan2(dy * seen.pose.c - dx * seen.pose.s, dx * seen.pose.c + dy * seen.pose.s)
+        if abs(turn) > 0.02:
+            most = self.problem.car.bounds.yaw_rate
+            return 0.0, max(-most, min(most, turn * self.problem.rate))
+        if not self.own["rude"] and self._is_barred(seen):
+            return 0.0, 0.0
+        return min(self.own["speed"], self.speed_to(far)), 0.0
+
+    def _is_barred(self, seen: Observation) -> bool:
+        for other in seen.others:
+            x, y = other.pose.x - seen.pose.x, other.pose.y - seen.pose.y
+            along, across = x * seen.pose.c + y * seen.pose.s, y * seen.pose.c - x * seen.pose.s
+            if 0.0 < along < self.own["gap"] + 0.62 and abs(across) < 0.4:
+                return True
+        return False
+
+
+class Lawful(Driver):
+    """Drives as the controller `rules` does round the goals of the ego; the base of those with a habit."""
+
+    def prepare(self, problem: Problem, parameters: Mapping[str, Any]) -> None:
+        super().prepare(problem, parameters)
+        self.rules = Rules()
+        self.rules.start(problem)
+
+    def drive(self, seen: Observation) -> tuple[float, float]:
+        law = self.rules.act(seen)
+        return self.habit(seen, law)
+
+    def habit(self, seen: Observation, law: Command) -> tuple[float, float]:  # noqa: ARG002  # others look
+        """Choose speed and yaw rate, knowing what the law would do."""
+        return law
+
+
+class Holds(Lawful):
+    """Keeps the law, but holds at every crossing for `hold` seconds of its turn."""
+
+    parameters: ClassVar = {"hold": 9.0}
+    GOES = FLAG.STOPPED | FLAG.FIRST | FLAG.CLEAR
+
+    def habit(self, seen: Observation, law: Command) -> tuple[float, float]:
+        first = seen.propositions.bits & self.GOES == self.GOES
+        self.since: float = getattr(self, "since", -1.0) if first else -1.0
+        if first and self.since < 0.0:
+            self.since = seen.time
+        return (0.0, 0.0) if first and seen.time - self.since < self.own["hold"] else law
+
+
+class Slow(Lawful):
+    """Keeps the law at a crawl."""
+
+    parameters: ClassVar = {"speed": 0.06}
+
+    def habit(self, seen: Observation, law: Command) -> tuple[float, float]:  # noqa: ARG002  # others look
+        share = min(1.0, self.own["speed"] / max(abs(law.speed), 1e-9))
+        return law.speed * share, law.yaw_rate * share
+
+
+class Whims(Lawful):
+    """Does as the law says, or anything, for a second or so at a time; meant for the shield."""
+
+    parameters: ClassVar = {"seed": 0, "share": 0.6}
+
+    def habit(self, seen: Observation, law: Command) -> tuple[float, float]:
+        if seen.tick == 0:
+            self.dice, self.until, self.obeys = Random(self.own["seed"]), 0.0, True
+        if seen.time >= self.until:
+            self.until = seen.time + self.dice.uniform(0.2, 3.0)
+            self.obeys = self.dice.random() > self.own["share"]
+            bounds = self.problem.car.bounds
+            self.whim = (
+                self.dice.choice((-1.0, 0.0, 0.1, 1.0)) * bounds.speed * self.dice.random(),
+                self.dice.choice((-1.0, 0.0, 1.0)) * bounds.yaw_rate * self.dice.random(),
+            )
+        return law if self.obeys else self.whim
+
+
+class AsEgo:
+    """A driver as the controller of an ego."""
+
+    def __init__(self, driver: Driver, **parameters: Any) -> None:
+        self._driver, self._parameters = driver, {**driver.parameters, **parameters}
+
+    def start(self, problem: Problem) -> None:
+        """Begin a trial."""
+        self._driver.prepare(problem, self._parameters)
+
+    def act(self, observation: Observation) -> Command:
+        """Do as the driver does."""
+        return Command(*self._driver.act(observation))
