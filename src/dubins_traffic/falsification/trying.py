@@ -32,7 +32,7 @@ from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Ruling
 from dubins_traffic.shield.tables import Overtakes, check_overtakes
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.problem.instance import Instance, Problem
     from dubins_traffic.protocols import Ending
 
 FORMULA: Final = "formula"
@@ -225,8 +225,10 @@ class Laboratory:
         frames = np.array([outcome.ending.ticks + 1 for outcome in outcomes])
         networks = [own.problem.network for own in group.instances]
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
-        rate = group.instances[0].problem.rate
-        tried = [tried_of(own.score, own.ending, passages, b, rate) for b, own in enumerate(outcomes)]
+        tried = [
+            tried_of(own.instance.problem, own.score, own.ending, passages, b)
+            for b, own in enumerate(outcomes)
+        ]
         whole = with_passages(tried, passages, group.instances[0])
         return {places[id(own.instance)]: came for own, came in zip(outcomes, whole, strict=True)}
 
@@ -273,9 +275,9 @@ def judged_record(record: Record) -> tuple[Score, Passages]:
     return score(record), trace.passages()
 
 
-def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int, rate: float) -> Tried:
-    """Return what a search keeps of a trial that has been judged: number `trial` of `passages`, at `rate` Hz."""
-    verdict = score.verdict
+def tried_of(problem: Problem, score: Score, ending: Ending | None, passages: Passages, trial: int) -> Tried:
+    """Return what a search keeps of a trial that has been judged: number `trial` of `passages`."""
+    verdict, rate = score.verdict, problem.rate
     fault = str(ending) if ending is not None and ending.end in FAULTS else ""
     margins = {
         f"{FORMULA} {own.name}": own.robustness for own in score.formulas if own.robustness is not None
@@ -284,7 +286,7 @@ def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int
     if verdict is None:
         return Tried(False, bool(fault), margins, (), fault=fault)
     margins |= {rule: value for rule, value in verdict.robustness.items() if value is not None}
-    late = spare(verdict, ending)
+    late = spare(problem, verdict, ending)
     margins |= {} if late is None else {LIVENESS: late}
     own = [broken for broken in verdict.violations if broken.car == EGO_NAME and broken.rule in EGO_RULES]
     first = {broken.rule: broken.tick for broken in reversed(own)}
@@ -302,7 +304,7 @@ def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int
 
 def _tried_alone(instance: Instance, found: Score, ending: Ending | None, passages: Passages) -> Tried:
     """Return what came of a trial that was run alone."""
-    tried = tried_of(found, ending, passages, 0, instance.problem.rate)
+    tried = tried_of(instance.problem, found, ending, passages, 0)
     return with_passages([tried], passages, instance)[0]
 
 
