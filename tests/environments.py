@@ -8,10 +8,10 @@ import gymnasium
 import numpy as np
 
 import dubins_traffic.envs  # noqa: F401  # makes its environments known
-from dubins_traffic import load_config
+from tests.minute import a_minute
 
 SHORT: dict[str, Any] = {
-    **load_config("junction").to_document(),
+    **a_minute("junction").to_document(),
     "e-agents": [{"type": "wander", "name": "wanderer", "count": 2}, {"type": "lawful", "name": "car"}],
     "duration": 3.0,
     "end_on_collision": True,

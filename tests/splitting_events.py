@@ -25,10 +25,11 @@ from dubins_traffic.falsification.intervals import clopper_pearson
 from dubins_traffic.falsification.replicas import Replicas, combined
 from dubins_traffic.falsification.sampling import STREAM, prepared
 from dubins_traffic.falsification.splitting import split
-from dubins_traffic.problem.configuration import Configuration, load_config
+from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.problem.instance import Instance
 from tests.falsifying import NEAR, corridor
+from tests.minute import a_minute
 
 TRUTHS: Final = Path(__file__).with_name("splitting_truths.json")
 RULE: Final = "1.collision"
@@ -106,7 +107,7 @@ def _nudged(
 def _junction(agents: list[dict[str, Any]], **more: Any) -> Configuration:
     """Return trials of eight seconds on `junction` with other e-agents."""
     changed = {"e-agents": agents, "rules": AWAY, "rate": 10, **more}
-    return prepared(_changed(load_config("junction"), **changed), 8.0, {})
+    return prepared(_changed(a_minute("junction"), **changed), 8.0, {})
 
 
 def _changed(configuration: Configuration, **more: Any) -> Configuration:

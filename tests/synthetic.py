@@ -156,5 +156,7 @@ def verdict(instance: Instance, breaches: list[tuple[float, str, str]], excuse: 
     found: dict[str, Any] = dict.fromkeys((own.name for own in fields(Verdict)), None)
     found |= {"verdict": ruling, "clean": clean, "excuse": why, "violations": violations, "collisions": ()}
     return Verdict(
-        **found | {"rounds": 2, "longest_gap_s": 10.0, "gap_limit_s": 100.0, "formulas": {}, "robustness": {}}
+        **found
+        | {"rounds": 2, "longest_gap_s": 10.0, "gap_limit_s": 100.0, "recurrent": True, "formulas": {}}
+        | {"robustness": {}}
     )

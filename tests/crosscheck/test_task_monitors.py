@@ -22,6 +22,7 @@ from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.judging import Judging
 from tests.judge_reference import Judge
 from tests.judging import GRID, ROADS, after, before, case, frames_of, lanes_in, lanes_out
+from tests.minute import a_minute
 from tests.rules_scripts import KITE, on_lane, wander
 from tests.signals import Key, first_breaches, judged, stated, summed
 
@@ -79,7 +80,7 @@ BREAKS = {"rolls": 0.3, "left": 0.3, "blocks": 0.5, "tailgates": 0.3, "parks": 1
 
 def town(rules: dict[str, float] | None = None, *, breaks: bool = False) -> Configuration:
     """Return the shipped `town`; with `breaks` its e-agents break rules, and one stands for ever."""
-    document = load_config("town").to_document()
+    document = a_minute("town").to_document()
     document |= {"duration": 40.0, "rules": rules or True}
     if breaks:
         document["network"] = {"random": {"intersections": 6, "segments": 7}}

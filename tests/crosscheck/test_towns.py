@@ -17,6 +17,7 @@ from dubins_traffic.roads.formats.opendrive import OpenDrive
 from dubins_traffic.roads.formats.sumo import SumoNet
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial
+from tests.minute import a_minute
 from tests.room import lacking
 from tests.tools import interpreter_with, sumo_program
 
@@ -35,7 +36,7 @@ def folder() -> Path:
 def test_lanes_drives_where_arms_are_a_hair_off_straight(controller: str) -> None:
     """Of grid6 the roads go on 1e-9 to 2e-8 rad off straight."""
     document, _ = SumoNet().reduced((folder() / "game" / "grid6" / "grid6.net.xml").read_text())
-    config = load_config("junction").to_document() | {"rnd": dict(document), "duration": 5.0}
+    config = a_minute("junction").to_document() | {"rnd": dict(document), "duration": 5.0}
     ran = run_trial(draw(load_config(config), seed=0, trial=0), controller)
     assert ran.ending.end is End.DURATION
 

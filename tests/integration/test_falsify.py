@@ -22,6 +22,7 @@ from dubins_traffic.falsification.shrink import single_removals
 from dubins_traffic.falsification.splitting import Particle, follow, split
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import NEAR, Rolling, corridor, standing
+from tests.minute import a_minute
 
 FULL = os.environ.get("DUBINS_TRAFFIC_ESTIMATES") == "full"
 """Whether rare events are estimated as often as the bars ask for: minutes."""
@@ -34,7 +35,7 @@ def _bytes(folder: Path) -> dict[str, bytes]:
 @pytest.fixture(scope="module")
 def found(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("search") / "found"
-    dt.falsify("junction", "simple", folder, trials=192, seed=1, duration=8.0)
+    dt.falsify(a_minute("junction"), "simple", folder, trials=192, seed=1, duration=8.0)
     return folder
 
 
@@ -71,7 +72,7 @@ def _simple() -> dt.Controller:
 def test_the_same_seed_gives_the_same_bytes_whoever_runs_the_trials_and_however_often_it_stopped(
     found: Path, tmp_path: Path
 ) -> None:
-    dt.falsify("junction", "simple", tmp_path / "two", trials=192, seed=1, duration=8.0, workers=2)
+    dt.falsify(a_minute("junction"), "simple", tmp_path / "two", trials=192, seed=1, duration=8.0, workers=2)
     assert _bytes(tmp_path / "two") == _bytes(found)
     stopped = tmp_path / "stopped"
 
@@ -80,9 +81,11 @@ def test_the_same_seed_gives_the_same_bytes_whoever_runs_the_trials_and_however_
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        dt.falsify("junction", "simple", stopped, trials=192, seed=1, duration=8.0, progress=interrupt)
+        dt.falsify(
+            a_minute("junction"), "simple", stopped, trials=192, seed=1, duration=8.0, progress=interrupt
+        )
     assert list(files(stopped))
-    dt.falsify("junction", "simple", stopped, trials=192, seed=1, duration=8.0, resume=True)
+    dt.falsify(a_minute("junction"), "simple", stopped, trials=192, seed=1, duration=8.0, resume=True)
     assert _bytes(stopped) == _bytes(found)
 
 
@@ -99,8 +102,10 @@ def test_a_search_that_is_interrupted_while_it_judges_goes_on_as_if_it_had_not_b
 
     monkeypatch.setattr(search, "case_in", once)
     with pytest.raises(KeyboardInterrupt):
-        dt.falsify("junction", "simple", tmp_path / "found", trials=192, seed=1, duration=8.0)
-    dt.falsify("junction", "simple", tmp_path / "found", trials=192, seed=1, duration=8.0, resume=True)
+        dt.falsify(a_minute("junction"), "simple", tmp_path / "found", trials=192, seed=1, duration=8.0)
+    dt.falsify(
+        a_minute("junction"), "simple", tmp_path / "found", trials=192, seed=1, duration=8.0, resume=True
+    )
     assert _bytes(tmp_path / "found") == _bytes(found)
 
 
@@ -112,10 +117,10 @@ def test_a_search_that_was_killed_finds_again_what_it_had_not_noted(found: Path,
     def look(_: object) -> None:
         states.append((folder / "state.json").read_bytes())
 
-    dt.falsify("junction", "simple", folder, trials=64, seed=1, duration=8.0, progress=look)
+    dt.falsify(a_minute("junction"), "simple", folder, trials=64, seed=1, duration=8.0, progress=look)
     assert list(files(folder))
     (folder / "state.json").write_bytes(states[0])
-    dt.falsify("junction", "simple", folder, trials=192, seed=1, duration=8.0, resume=True)
+    dt.falsify(a_minute("junction"), "simple", folder, trials=192, seed=1, duration=8.0, resume=True)
     assert _bytes(folder) == _bytes(found)
 
 
@@ -163,15 +168,21 @@ def test_commands_find_shrink_and_run_cases_again(tmp_path: Path, capsys: pytest
 
 
 def test_controllers_of_ones_own_are_searched_too(tmp_path: Path) -> None:
-    result = dt.falsify("junction", Rolling, tmp_path / "own", trials=32, duration=8.0, rules=["1.road"])
+    result = dt.falsify(
+        a_minute("junction"), Rolling, tmp_path / "own", trials=32, duration=8.0, rules=["1.road"]
+    )
     assert result.violated
     assert {case.story.rule for case in result.cases.values()} == {"1.road"}
 
 
 def test_a_formula_and_the_least_score_can_be_asked_for(tmp_path: Path) -> None:
-    asked = dt.falsify("junction", "simple", tmp_path / "f", trials=8, duration=6.0, formula="[] !left_ego")
+    asked = dt.falsify(
+        a_minute("junction"), "simple", tmp_path / "f", trials=8, duration=6.0, formula="[] !left_ego"
+    )
     assert [case.story.rule for case in asked.cases.values()][:1] == ["formula asked"]
-    least = dt.falsify("junction", "simple", tmp_path / "s", trials=16, duration=6.0, least_score=True)
+    least = dt.falsify(
+        a_minute("junction"), "simple", tmp_path / "s", trials=16, duration=6.0, least_score=True
+    )
     assert {case.story.rule for case in least.cases.values()} == {"score"}
 
 
@@ -231,7 +242,7 @@ def test_monte_carlo_counts_what_the_judge_says() -> None:
     from dubins_traffic.falsification.crew import Here
     from dubins_traffic.falsification.sampling import prepared
 
-    configuration = prepared(dt.load_config("junction"), 6.0, {})
+    configuration = prepared(a_minute("junction"), 6.0, {})
     found = by_counting(
         draw_many(configuration, 1, range(32)), Here("simple", "simple"), "3.stop", 0.0, lambda _: None
     )

@@ -17,10 +17,11 @@ from dubins_traffic.falsification.genome import Genome
 from dubins_traffic.falsification.journal import Journal
 from dubins_traffic.falsification.sampling import Source, prepared
 from dubins_traffic.falsification.trying import Laboratory, Tried, in_order
-from dubins_traffic.problem.configuration import load_config
 from tests.campaigns import COMMAND
+from tests.minute import a_minute
 
 TRIALS = 12
+
 PATIENT = """
 import time
 from pathlib import Path
@@ -101,7 +102,7 @@ def test_trials_of_a_slow_controller_are_kept_one_by_one(
 
 
 def test_what_came_of_a_trial_is_read_as_it_was_kept(tmp_path: Path) -> None:
-    source = Source(prepared(load_config("junction"), 8.0, {"soon": "[] !left_ego"}), 1)
+    source = Source(prepared(a_minute("junction"), 8.0, {"soon": "[] !left_ego"}), 1)
     genomes = [source.fresh(number) for number in range(24)]
     tried = in_order(Laboratory("simple").attempt(source.build(genomes)))
     tried.append(Tried(True, True, {"1.road": float("inf")}, (), fault="raised: a\nb"))
@@ -142,7 +143,7 @@ def test_a_damaged_line_is_passed_over(tmp_path: Path, place: int) -> None:
 def test_a_file_of_that_name_that_is_no_journal_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "journal.txt").write_text("Monday: rain.\n")
     with pytest.raises(InputError, match="holds files that are no search's"):
-        dt.falsify("junction", folder=tmp_path, trials=1, duration=2.0)
+        dt.falsify(a_minute("junction"), folder=tmp_path, trials=1, duration=2.0)
     assert (tmp_path / "journal.txt").read_text() == "Monday: rain.\n"
 
 
@@ -151,7 +152,7 @@ def test_a_search_that_is_interrupted_before_it_has_used_its_journal_keeps_it(
 ) -> None:
     """Also if it goes on with more trials, and by other processes."""
     given = {"controller": "simple", "seed": 1, "duration": 4.0}
-    dt.falsify("junction", folder=tmp_path / "plain", trials=64, **given)
+    dt.falsify(a_minute("junction"), folder=tmp_path / "plain", trials=64, **given)
 
     def interrupt(own: search.Search) -> None:
         if own.finished:
@@ -159,7 +160,7 @@ def test_a_search_that_is_interrupted_before_it_has_used_its_journal_keeps_it(
 
     out = tmp_path / "out"
     with pytest.raises(KeyboardInterrupt):
-        dt.falsify("junction", folder=out, trials=8, progress=interrupt, **given)
+        dt.falsify(a_minute("junction"), folder=out, trials=8, progress=interrupt, **given)
     before = kept(out)
     assert before > 0
     with monkeypatch.context() as patched:
@@ -169,7 +170,7 @@ def test_a_search_that_is_interrupted_before_it_has_used_its_journal_keeps_it(
 
         patched.setattr(Source, "build", torn)
         with pytest.raises(KeyboardInterrupt):
-            dt.falsify("junction", folder=out, trials=64, resume=True, **given)
+            dt.falsify(a_minute("junction"), folder=out, trials=64, resume=True, **given)
     assert kept(out) == before
     handed: list[int] = []
     real = crew.Elsewhere.run
@@ -179,6 +180,6 @@ def test_a_search_that_is_interrupted_before_it_has_used_its_journal_keeps_it(
         return real(own, instances)
 
     monkeypatch.setattr(crew.Elsewhere, "run", watched)
-    dt.falsify("junction", folder=out, trials=64, workers=2, resume=True, **given)
+    dt.falsify(a_minute("junction"), folder=out, trials=64, workers=2, resume=True, **given)
     assert handed == [32 - before, 32]
     assert whole(out) == whole(tmp_path / "plain")

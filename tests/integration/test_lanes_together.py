@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-import dubins_traffic as dt
 from dubins_traffic.controllers.registry import load
 from dubins_traffic.falsification.sampling import Source, prepared
 from dubins_traffic.falsification.trying import Laboratory, in_order
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.shield.tables import Overtakes
+from tests.minute import a_minute
 from tests.mutant_searches import TOWN
 
 
@@ -21,7 +21,7 @@ def trials(world: str, seconds: float, count: int) -> list[Instance]:
         "obstacles": [{"disc": {"x": 3.0 + 6.0 * k, "y": 5.85, "radius": 0.1}} for k in range(3)],
         "e-agents": [{"type": "lawful", "name": "car", "count": 6}],
     }  # fmt: skip
-    own = dt.load_config(world) if world != "town" else Configuration.from_document(document)
+    own = a_minute(world) if world != "town" else Configuration.from_document(document)
     source = Source(prepared(own, seconds, {}), 3)
     return source.build([source.fresh(number) for number in range(count)])
 

@@ -13,7 +13,8 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic import load_config, run_batch, run_trial
+from dubins_traffic import run_batch, run_trial
+from tests.minute import a_minute
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -102,7 +103,7 @@ def test_the_controller_on_the_page_on_batches_drives_alike_alone():
     (code,) = [text for language, text in runnable(page) if language == "python" and FILE_NAME.match(text)]
     made: dict[str, Any] = {}
     exec(compile(code, "keeper.py", "exec"), made)
-    config = load_config("town")
+    config = a_minute("town")
     for outcome in run_batch(config, made["Keeper"], trials=6, batch=4).outcomes:
         assert run_trial(outcome.instance, made["Keeper"]()).score.driven == outcome.score.driven
 

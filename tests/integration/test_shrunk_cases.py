@@ -10,6 +10,7 @@ import dubins_traffic as dt
 from dubins_traffic.falsification.archive import files
 from dubins_traffic.falsification.case import read_case
 from tests.cases_again import driver_of, judged_afresh, still_broken
+from tests.minute import a_minute
 
 CASES = sorted((Path(__file__).parents[1] / "cases").rglob("*.json"))
 MOST = 3
@@ -26,7 +27,7 @@ def test_a_case_of_the_project_loses_its_breach_with_any_one_thing_less(path: Pa
 
 def test_so_do_cases_of_a_fresh_search_and_most_have_few_cars(tmp_path: Path) -> None:
     controller = "lanes"
-    dt.falsify("junction", controller, tmp_path, trials=96, seed=5, duration=8.0)
+    dt.falsify(a_minute("junction"), controller, tmp_path, trials=96, seed=5, duration=8.0)
     cases = [read_case(path) for path in files(tmp_path)][:FRESH]
     assert len(cases) == FRESH
     for case in cases:

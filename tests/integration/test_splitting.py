@@ -6,7 +6,6 @@ import os
 import numpy as np
 import pytest
 
-import dubins_traffic as dt
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.cli.main import main
 from dubins_traffic.engine.group import Group
@@ -15,6 +14,7 @@ from dubins_traffic.falsification.crew import maker
 from dubins_traffic.falsification.sampling import prepared
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import corridor
+from tests.minute import a_minute
 from tests.splitting_events import Traffic, estimates, probability, traffic, truths
 
 FULL = os.environ.get("DUBINS_TRAFFIC_ESTIMATES") == "full"
@@ -69,7 +69,7 @@ def test_a_level_sees_a_collision_before_it_comes() -> None:
 
 
 def test_a_level_is_never_above_the_margin_and_below_it_only_for_a_collision() -> None:
-    own = prepared(dt.load_config("junction"), 4.0, {})
+    own = prepared(a_minute("junction"), 4.0, {})
     instances = list(draw_many(own, 3, range(16)))
     group = Group(instances, keeps_rules=True)
     collision, clear = Driven(group, "1.collision"), Driven(group, "3.clear")

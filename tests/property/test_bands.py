@@ -28,6 +28,7 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.protocols import End
 from dubins_traffic.rules.blocking import _clipped
 from dubins_traffic.runs.single import run_trial
+from tests.minute import a_minute
 
 PERIOD = 1.0 / 30.0
 CARS = {
@@ -171,7 +172,7 @@ def test_roads_that_are_nearly_straight(controller: str, off: float) -> None:
         [1.0, 0.0, 1.0, 1.0],
         [1.0, 1.0, 1.0 - off, 2.0],
     ]
-    document = load_config("junction").to_document()
+    document = a_minute("junction").to_document()
     document["rnd"] = {"version": 2, "length": 6, "segments": arms}
     ran = run_trial(draw(load_config({**document, "duration": 1.0}), seed=0, trial=0), controller)
     assert ran.ending.end is End.DURATION

@@ -23,6 +23,7 @@ from dubins_traffic.record.reader import Record, read, replay
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
 from tests.formulas import drawn
+from tests.minute import a_minute
 
 NAMES = ("a", "b", "c")
 
@@ -62,7 +63,7 @@ def test_what_every_continuation_breaks_is_false_and_what_none_breaks_is_true(se
 def record(controller: str) -> Record:
     """Return a trial of some seconds among cars that wander."""
     document = {
-        **load_config("junction").to_document(),
+        **a_minute("junction").to_document(),
         "e-agents": [{"type": "wander", "name": "car", "count": 3}],
         "duration": 6.0,
     }

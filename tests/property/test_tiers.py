@@ -10,9 +10,9 @@ from dubins_traffic.engine.batch_kernel import run_trials
 from dubins_traffic.kernels import asking, store
 from dubins_traffic.kernels.compile import Kernel, rehearsal
 from dubins_traffic.kernels.machine import Code
-from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.runs.single import run_trial
+from tests.minute import a_minute
 
 TRIALS = 6
 
@@ -53,10 +53,10 @@ class Switches:
 
 @pytest.mark.parametrize("looks", [0, 4, 9])
 def test_a_batch_that_goes_over_on_its_way_gives_the_same(monkeypatch, looks) -> None:
-    plain = run_batch("town", trials=TRIALS, seed=5, batch=4)
+    plain = run_batch(a_minute("town"), trials=TRIALS, seed=5, batch=4)
     switches = Switches(monkeypatch, looks)
     with rehearsal():
-        mixed = run_batch("town", trials=TRIALS, seed=5, batch=4)
+        mixed = run_batch(a_minute("town"), trials=TRIALS, seed=5, batch=4)
     assert mixed.sheet.asdict() == plain.sheet.asdict()
     assert [own.ending for own in mixed.outcomes] == [own.ending for own in plain.outcomes]
     assert run_trials in switches.gone_over()
@@ -67,7 +67,7 @@ def test_a_batch_that_goes_over_on_its_way_gives_the_same(monkeypatch, looks) ->
 def test_a_trial_that_goes_over_on_its_way_records_the_same(
     monkeypatch, tmp_path: Path, controller, looks
 ) -> None:
-    instance = draw(load_config("town"), 2, 1)
+    instance = draw(a_minute("town"), 2, 1)
     run_trial(instance, controller, record=tmp_path / "plain.mcap")
     switches = Switches(monkeypatch, looks)
     with rehearsal():

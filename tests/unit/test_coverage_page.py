@@ -8,8 +8,8 @@ from dubins_traffic.falsification.case import Case, Story
 from dubins_traffic.falsification.cells import Cell, Manoeuvre
 from dubins_traffic.falsification.coverage import Row
 from dubins_traffic.falsification.coverage_page import coverage_page
-from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
+from tests.minute import a_minute
 
 NASTY = "</style><script>alert(1)</script><img src=http://x.example>"
 SETTINGS = {"controller": NASTY, "targets": ["3.clear"], "seed": 7, "strategy": "evolution"}
@@ -19,7 +19,7 @@ ROWS = [
     Row(Cell("3.clear", Manoeuvre.LEFT, 3), 0, 0),
     Row(Cell("3.clear", Manoeuvre.LEFT, 4), 5, 2),
 ]
-CASE = Case(draw(load_config("junction"), 1, 0), Story("3.clear", "left", 4, "x", 2.0, 60, NASTY))
+CASE = Case(draw(a_minute("junction"), 1, 0), Story("3.clear", "left", 4, "x", 2.0, 60, NASTY))
 
 
 def test_each_cell_stands_in_words_and_an_empty_one_is_a_warning() -> None:

@@ -19,13 +19,13 @@ from dubins_traffic.falsification.passages import find_passages
 from dubins_traffic.falsification.sampling import Source, Stream, prepared
 from dubins_traffic.falsification.strategies import make
 from dubins_traffic.falsification.trying import Tried, with_passages
-from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.starts import gap_radius
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.propositions import FLAG
+from tests.minute import a_minute
 
-JUNCTION = load_config("junction")
+JUNCTION = a_minute("junction")
 STORY = Story("3.clear", "left", 4, "simple", 2.0, 60, "At 2.00 s the ego entered.")
 
 

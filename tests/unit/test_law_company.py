@@ -15,6 +15,7 @@ from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import Frames
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
+from tests.minute import a_minute
 from tests.unit.test_law import W, broken, car, on_grid, turned
 
 
@@ -148,7 +149,7 @@ def test_nobody_parks_longer_than_the_rules_allow() -> None:
 
 
 def test_town_is_lawful_traffic() -> None:
-    town = load_config("town")
+    town = a_minute("town")
     for trial in range(4):
         score = run_trial(draw(town, 1, trial), "rules").score
         assert score.verdict is not None
@@ -156,6 +157,6 @@ def test_town_is_lawful_traffic() -> None:
 
 
 def test_wanderers_break_the_assumption() -> None:
-    wanderers = load_config("wanderers")
+    wanderers = a_minute("wanderers")
     scores = [run_trial(draw(wanderers, 1, trial), "rules").score for trial in range(3)]
     assert any(broken(score, name) for score in scores for name in ("wanderer0", "bus", "van"))

@@ -16,7 +16,6 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.logic.formula import disj, implies, negation, prop
 from dubins_traffic.logic.robustness import robustness
 from dubins_traffic.logic.temporal import always, eventually
-from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
@@ -25,6 +24,7 @@ from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.margins import MARGINS, MEASURED, Margins
 from dubins_traffic.scoring.score import score
 from tests.judging import GRID, RHO, ROADS, case, frames_of, lanes_in
+from tests.minute import a_minute
 from tests.recordings import blocks
 from tests.rules_scripts import Frame, label, on_lane
 
@@ -119,7 +119,7 @@ def test_signs_agree_with_the_verdict_on_records(
 ) -> None:
     for number in range(3):
         file = tmp_path / "a.mcap"
-        run_trial(draw(load_config("town"), 5, number), controller, record=file, overwrite=True)
+        run_trial(draw(a_minute("town"), 5, number), controller, record=file, overwrite=True)
         kept = read(str(file))
         verdict = score(kept).verdict
         assert verdict is not None

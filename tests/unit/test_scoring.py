@@ -32,7 +32,7 @@ def test_a_visit_is_an_entry_and_a_start_inside_counts() -> None:
     path = [A] * 31 + [C] * 30 + [A] * 30 + [B] * 60 + [ROAD] * 30
     found = visits(path)
     assert found == Visits(
-        (GoalVisits((0, 0), 2, (180 - 61) / 30.0), GoalVisits((2, 1), 1, 91 / 30.0)), 1.0, 1
+        (GoalVisits((0, 0), 2, (180 - 61) / 30.0), GoalVisits((2, 1), 1, 91 / 30.0)), 1.0, 1, recurrent=False
     )
 
 
@@ -118,7 +118,7 @@ def test_who_stands_in_a_goal_has_no_round_before_a_breach() -> None:
 
 
 def test_without_goals_there_are_no_rounds_and_nothing_is_missed() -> None:
-    assert visits([A] * 5, goals=[]) == Visits((), 1.0, 0)
+    assert visits([A] * 5, goals=[]) == Visits((), 1.0, 0, recurrent=True)
 
 
 def drive(frames: Frames, instance=None) -> Driven:

@@ -14,6 +14,7 @@ from dubins_traffic.problem.instance import Disturbances, Laser
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.scoring.score import Scorer
+from tests.minute import a_minute
 
 
 class Collect:
@@ -242,7 +243,7 @@ def test_the_laser_sweeps_at_its_own_rate() -> None:
 
 
 def test_a_judged_trial_is_scored_before_its_first_second_has_passed() -> None:
-    trial = Trial(draw(load_config("town"), 1, 0), sinks=[Scorer()])
+    trial = Trial(draw(a_minute("town"), 1, 0), sinks=[Scorer()])
     assert Scorer in {type(sink) for sink in trial.sinks}
     first = trial.sinks[0].result()
     trial.step((0.5, 0.0))

@@ -30,6 +30,7 @@ from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.formulas import FormulaVerdicts
 from dubins_traffic.scoring.score import score
 from tests.judging import GRID, case
+from tests.minute import a_minute
 from tests.recordings import blocks
 from tests.unit.test_formula_syntax import MALFORMED
 
@@ -278,7 +279,7 @@ def test_the_example_of_the_documentation_can_be_judged() -> None:
     example = re.search(r'^"formulas": \{\n(?:.*\n)+?\}', text, re.MULTILINE)
     assert example is not None
     found = json.loads("{" + example[0] + "}")["formulas"]
-    made = draw(load_config("town"), 0, 0)
+    made = draw(a_minute("town"), 0, 0)
     check_formulas(replace(made.problem, formulas=found), made.names)
     assert len(found) >= 3
 

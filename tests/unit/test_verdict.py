@@ -33,6 +33,7 @@ from dubins_traffic.scoring.score import score
 from dubins_traffic.scoring.verdict import Verdict
 from dubins_traffic.viewer.marks import breach_marks
 from tests.judging import GRID, ROADS, before, case, frames_of, lanes_in, lanes_out
+from tests.minute import a_minute
 from tests.recordings import blocks
 from tests.rules_scripts import KITE, STAR, Frame, on_lane
 
@@ -118,7 +119,7 @@ class Raises:
 
 
 def test_alone_and_in_a_batch_who_raises_is_not_clean() -> None:
-    configuration = load_config("junction")
+    configuration = a_minute("junction")
     together = run_batch(configuration, Raises, trials=2, seed=1).outcomes
     for outcome in together:
         alone = run_trial(outcome.instance, Raises())
@@ -292,13 +293,20 @@ def test_satisfied_needs_every_goal_and_short_gaps(roads: RoadNetwork) -> None:
         return visits(50, visit=visit, goals=goals, roads=roads, **rules).verdict.value
 
     assert ruling([10, 30], [goal]) == "satisfied"
+    assert ruling([10, 30], [goal], gap_share=20 / 49) == "satisfied"
+    assert ruling([10, 30], [goal], gap_share=20 / 49 - 1e-9) == "unfinished"
+    assert ruling([20], [goal], gap_share=1.0) == "unfinished", "one visit"
+    assert ruling([0, 20], [goal], gap_share=1.0) == "unfinished", "one visit after the start"
+    assert ruling([0, 20, 40], [goal]) == "satisfied"
     assert ruling([], [goal]) == "unfinished"
     assert ruling([10], [goal, other]) == "unfinished"
     assert ruling([], []) == "satisfied"
     found = visits(50, visit=[10, 30], goals=[goal], roads=roads)
     assert (found.rounds, found.longest_gap_s) == (2, 2.0)
     once = free_flow(case(roads, 1, [goal])).round_time
-    assert found.gap_limit_s == 10.0 * once
+    assert found.recurrent
+    assert found.gap_limit_s == pytest.approx(0.5 * 4.9)
+    assert visits(50, visit=[10], goals=[goal], roads=roads, gap_share=1e9).gap_limit_s == 10.0 * once
     assert ruling([10, 30], [goal], gap_rounds=2.0 / once + 1e-9) == "satisfied"
     assert ruling([10, 30], [goal], gap_rounds=2.0 / once - 1e-9) == "unfinished"
 

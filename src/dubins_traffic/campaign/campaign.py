@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import product
 from pathlib import Path
 from typing import Any, cast
@@ -21,8 +21,10 @@ from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import is_file
 from dubins_traffic.problem.configuration import Configuration, load_config
+from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.faults import parse
 from dubins_traffic.problem.files import plain, read_toml
+from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import Column
@@ -122,6 +124,11 @@ class Campaign:
     def factors(self) -> tuple[str, ...]:
         """Names of the factors, in the order of the table's columns."""
         return tuple(self.cells[0].values)
+
+    def first_trials(self) -> Iterator[Callable[[], Instance]]:
+        """Yield what draws the first trial of each cell, in order."""
+        for cell in self.cells:
+            yield partial(draw, cell.settled, cell.seed, 0)
 
     def chunks(self) -> Iterator[Chunk]:
         """Yield all chunks, in order; they depend on the campaign alone."""

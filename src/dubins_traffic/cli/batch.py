@@ -73,10 +73,16 @@ def batch(
     from dubins_traffic.controllers.registry import dressed
     from dubins_traffic.engine.batch import run_batch
     from dubins_traffic.problem.configuration import load_config
+    from dubins_traffic.problem.draw import draw
+    from dubins_traffic.scoring.long_enough import LOOKED_AT, short_notice
 
     drawn = load_config(configuration)
     maps.report(drawn.network)
     count = drawn.number_trials if trials is None else trials
+    if not json:
+        faults.warn(
+            short_notice([partial(draw, drawn, seed, trial) for trial in range(min(count, LOOKED_AT))])
+        )
     run = partial(
         run_batch,
         drawn,

@@ -75,8 +75,11 @@ def run(
     from dubins_traffic.campaign.folder import kept
     from dubins_traffic.campaign.run_campaign import run_campaign
     from dubins_traffic.cli.progress import progress
+    from dubins_traffic.scoring.long_enough import short_notice
 
     total = 0
+    planned = load_campaign(file, sandbox=options.boxes(sandbox, limits, trust))
+    faults.warn(short_notice(planned.first_trials()))
 
     def tell(done: int, count: int) -> None:
         nonlocal total
@@ -86,7 +89,7 @@ def run(
     try:
         with progress() as show:
             ran = run_campaign(
-                load_campaign(file, sandbox=options.boxes(sandbox, limits, trust)),
+                planned,
                 folder,
                 workers=workers,
                 ray=ray,
@@ -108,9 +111,7 @@ def _conclude(ran: Ran) -> None:
 
     before = f", {ran.before} of them before" if ran.before else ""
     print(f"{ran.folder / RESULTS}: {ran.campaign.total} trials{before}")
-    notice = assumption_notice(*assumption(ran.folder))
-    if notice:
-        faults.tell(notice)
+    faults.warn(assumption_notice(*assumption(ran.folder)))
     faults.fail_if(faulty(ran.folder))
 
 

@@ -44,9 +44,7 @@ def check(
     else:
         for record, ending, scored in scores:
             _show(shown(record), ending, scored)
-    notice = assumption_notice(*ScoreSheet(tuple(scored for *_, scored in scores)).assumption_broken)
-    if notice:
-        faults.tell(notice)
+    faults.warn(assumption_notice(*ScoreSheet(tuple(scored for *_, scored in scores)).assumption_broken))
 
 
 def _document(record: str, score: Score) -> dict[str, Any]:
@@ -91,10 +89,14 @@ def _show(record: str, ending: Ending | None, score: Score) -> None:
 
 def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
     clean = "clean" if verdict.clean else "cut" if verdict.cut else "not clean"
-    gap = "" if verdict.longest_gap_s is None else f", longest gap {verdict.longest_gap_s:.1f} s"
-    limit = "" if verdict.gap_limit_s is None else f" of {verdict.gap_limit_s:.1f} s allowed"
-    line = f"{record}: {clean}, {verdict.verdict}, {verdict.rounds} rounds{gap}{limit if gap else ''}"
-    console.print(line, markup=False)
+    console.print(f"{record}: {clean}, {verdict.verdict}, {verdict.rounds} rounds", markup=False)
+    if verdict.longest_gap_s is not None and verdict.gap_limit_s is not None:
+        twice = "every goal was visited" if verdict.recurrent else "some goal was not visited"
+        console.print(
+            f"  the longest time without a visit of some goal was {verdict.longest_gap_s:.1f} s, and `satisfied` "
+            f"allows {verdict.gap_limit_s:.1f} s; {twice} twice after the start",
+            markup=False,
+        )
     if verdict.excuse is not None:
         excuse = verdict.excuse
         sensed = "within" if excuse.sensed else "beyond"

@@ -65,6 +65,12 @@ def tell(text: str) -> None:
         _discard(sys.__stderr__ or sys.stderr)
 
 
+def warn(notice: str) -> None:
+    """Print a notice on standard error, unless it is empty."""
+    if notice:
+        tell(notice)
+
+
 def tell_failed(trials: Iterable[tuple[Instance, Ending]]) -> bool:
     """Tell of each trial that ended by a fault why; return whether none did."""
     from dubins_traffic.record.sink import FAULTS

@@ -194,8 +194,10 @@ def _trials(
 ) -> Path:
     from dubins_traffic.campaign.folder import kept
     from dubins_traffic.cli.progress import progress
+    from dubins_traffic.scoring.long_enough import short_notice
     from dubins_traffic.suites.run_suite import run_suite
 
+    faults.warn(short_notice(found.campaign(["simple"]).first_trials()))
     try:
         with progress() as tell:
             return run_suite(

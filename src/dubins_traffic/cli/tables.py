@@ -130,9 +130,7 @@ def show(sheet: ScoreSheet, *, json: bool) -> None:
         console.print(NOTE, style="dim", highlight=False, soft_wrap=True)
         if any(score.formulas for score in sheet.trials):
             console.print(formula_table(sheet))
-    notice = assumption_notice(*sheet.assumption_broken)
-    if notice:
-        faults.tell(notice)
+    faults.warn(assumption_notice(*sheet.assumption_broken))
 
 
 def summary(score: Score) -> dict[str, str]:

@@ -11,14 +11,15 @@ import numpy as np
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.kinds import KEEP_RULES
+from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.margins import SURE
-from dubins_traffic.scoring.verdict import EGO_NAME, Place, Violation
+from dubins_traffic.scoring.verdict import EGO_NAME, Place, Violation, rounds_limit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from dubins_traffic.falsification.passages import Passages
-    from dubins_traffic.problem.instance import EAgent, Instance
+    from dubins_traffic.problem.instance import EAgent, Instance, Problem
     from dubins_traffic.record.reader import Record
     from dubins_traffic.scoring.verdict import Verdict
 
@@ -46,6 +47,12 @@ class Kept:
 
     margins: dict[str, float] = field(default_factory=dict[str, float])
     frames: dict[str, int] = field(default_factory=dict[str, int])
+
+
+def limit_of(problem: Problem) -> float | None:
+    """Return the longest gap that is none to look for, seconds; None if no round goes through all goals."""
+    limit = rounds_limit(problem, RuleParameters.from_mapping(problem.rules))
+    return limit if math.isfinite(limit) else None
 
 
 def keeps_law(agent: EAgent) -> bool:
@@ -90,7 +97,7 @@ def _longest_wait(
 
     None without a limit, and of a trial that is not longer. Time counts while nobody has broken anything.
     """
-    limit, rate = verdict.gap_limit_s, instance.problem.rate
+    limit, rate = limit_of(instance.problem), instance.problem.rate
     if limit is None or instance.duration <= limit:
         return None
     allowed = _ticks(limit, rate)
@@ -113,7 +120,7 @@ def breach_of(target: str, tick: int, verdict: Verdict, record: Record) -> Viola
         if found is not None:
             return Violation(target, found.car, found.time, found.tick, found.since, found.where)
     x, y = float(frames.x[tick, EGO]), float(frames.y[tick, EGO])
-    since = tick - 1 - _ticks(verdict.gap_limit_s or 0.0, frames.rate)
+    since = tick - 1 - _ticks(limit_of(record.instance.problem) or 0.0, frames.rate)
     return Violation(
         target, EGO_NAME, tick / frames.rate, tick, since / frames.rate, Place(x, y, None, None)
     )  # fmt: skip

@@ -13,6 +13,7 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.falsification import contract
 from dubins_traffic.falsification.case import Case, Story
+from dubins_traffic.falsification.contract import limit_of
 from dubins_traffic.falsification.liveness import first_overdue, spare
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.sentences import sentence_of
@@ -77,11 +78,12 @@ class Judged:
 
     def _overdue(self) -> Violation | None:
         """Return where the ego was when a goal had not been visited for too long."""
-        verdict, frames = self.score.verdict, self.record.frames
-        late = None if verdict is None else spare(verdict, self.record.ending)
-        if verdict is None or verdict.gap_limit_s is None or late is None or late >= 0.0:
+        verdict, frames, problem = self.score.verdict, self.record.frames, self.record.instance.problem
+        late = None if verdict is None else spare(problem, verdict, self.record.ending)
+        limit = limit_of(problem)
+        if limit is None or late is None or late >= 0.0:
             return None
-        found = first_overdue(self.record, verdict.gap_limit_s)
+        found = first_overdue(self.record, limit)
         if found is None:
             return None
         x, y = float(frames.x[found.tick, EGO]), float(frames.y[found.tick, EGO])

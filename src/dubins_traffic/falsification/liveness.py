@@ -1,16 +1,17 @@
-"""Liveness as what a search looks for: a goal that was not visited for longer than ``satisfied`` allows."""
+"""Liveness as what a search looks for: a goal that was not visited for longer than ``gap_rounds`` free-flow rounds.
+
+Of what ``satisfied`` allows that is the part that does not depend on the duration, since cases are cut where they end.
+"""
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsification.contract import CONTRACT
+from dubins_traffic.falsification.contract import CONTRACT, limit_of
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import replay
-from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.goals import Visiting
 from dubins_traffic.scoring.margins import LIVENESS, SURE
 from dubins_traffic.scoring.verdict import EGO_RULES
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from dubins_traffic.kernels.arrays import Ints
-    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.problem.instance import Instance, Problem
     from dubins_traffic.protocols import Ending
     from dubins_traffic.record.reader import Record
     from dubins_traffic.scoring.verdict import Verdict
@@ -37,12 +38,12 @@ class Overdue:
     tick: int
 
 
-def spare(verdict: Verdict, ending: Ending | None) -> float | None:
+def spare(problem: Problem, verdict: Verdict, ending: Ending | None) -> float | None:
     """Return by how many seconds the longest gap of a goal stayed below its limit; negative exactly if it did not.
 
     None without goals, and of a trial that did not run its whole duration: what would have come is not known.
     """
-    limit, gap = verdict.gap_limit_s, verdict.longest_gap_s
+    limit, gap = limit_of(problem), verdict.longest_gap_s
     if limit is None or gap is None or ending is None or ending.end is not End.DURATION:
         return None
     return min(limit - gap, -SURE) if gap > limit else max(limit - gap, SURE)
@@ -63,15 +64,9 @@ def check_long_enough(instances: Sequence[Instance], target: str) -> None:
     InputError
         If there is none, or they have no goals.
     """
-    from dubins_traffic.routing.rounds import round_time  # compiles; only where it is asked for
-
-    limits = [
-        RuleParameters.from_mapping(own.problem.rules).gap_rounds * round_time(own.problem)
-        for own in instances
-        if own.problem.goals
-    ]
-    least = min(limits, default=math.inf)
-    if not math.isfinite(least):
+    limits = [limit_of(own.problem) for own in instances]
+    least = min([limit for limit in limits if limit is not None], default=None)
+    if least is None:
         raise InputError("has no goals that can be visited", file="--rule", value=target)
     longest = max(own.duration for own in instances)
     if longest <= least:

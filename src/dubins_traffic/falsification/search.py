@@ -272,8 +272,8 @@ def falsify(
         What is found is kept here; made if missing.
     rules : sequence of str
         The rules that are asked for, such as ``3.clear``; by default all that a trial of any length can break.
-        ``1.goal`` asks for goals that are not visited for longer than ``satisfied`` allows, ``blocked`` for no visit at
-        all for so long before anybody has broken a rule, ``provoked`` for a first breach by a `lawful` e-agent.
+        ``1.goal`` asks for goals that are not visited for longer than ``gap_rounds`` free-flow rounds, ``blocked`` for
+        no visit at all for so long before anybody has broken a rule, ``provoked`` for a first breach by a lawful car.
     formula : str, optional
         A formula of one's own that is asked for instead, one that a finite trial can break.
     least_score : bool

@@ -287,7 +287,7 @@ def tried_of(
     if verdict is None:
         return Tried(False, bool(fault), margins, (), fault=fault)
     margins |= {rule: value for rule, value in verdict.robustness.items() if value is not None}
-    late = spare(verdict, ending)
+    late = spare(instance.problem, verdict, ending)
     margins |= {} if late is None else {LIVENESS: late}
     own = [broken for broken in verdict.violations if broken.car == EGO_NAME and broken.rule in EGO_RULES]
     first = {broken.rule: broken.tick for broken in reversed(own)}

@@ -19,6 +19,8 @@ from dubins_traffic.roads.network import RoadNetwork
 
 BESIDE = 0.02
 """Gap that a car needs beside it to pass an obstacle within its lane, metres."""
+MOST_STEPS = 10_000
+"""Intersections that are tried as goals that are far apart, before they count as not found."""
 
 
 class Stream(IntEnum):
@@ -32,14 +34,62 @@ class Stream(IntEnum):
 
 
 def draw_goals(
-    network: RoadNetwork, bounds: tuple[int, int], draws: Draws
+    network: RoadNetwork, bounds: tuple[int, int], draws: Draws, apart: int = 1
 ) -> tuple[tuple[float, float], ...]:
-    """Return goals, their number drawn from `bounds` (both included); they differ as far as intersections suffice."""
+    """Return goals, their number drawn from `bounds` (both included); they differ as far as intersections suffice.
+
+    With `apart` of 2 or more every two goals are at least so many segments apart along the roads: each is drawn evenly
+    among the intersections that are far enough from those before it, and others are tried where that leads nowhere.
+
+    Raises
+    ------
+    InputError
+        If no such goals are found.
+    """
     count = draws.between(*bounds)
     places = len(network.intersections)
-    picks = draws.sample(min(count, places), places)
-    picks += [draws.below(places) for _ in range(count - places)]
+    if apart > 1:
+        picks = _far_apart(network, count, apart, draws.shuffled(places))
+    else:
+        picks = draws.sample(min(count, places), places)
+        picks += [draws.below(places) for _ in range(count - places)]
     return tuple(network.intersections[v] for v in picks)
+
+
+def _far_apart(network: RoadNetwork, count: int, apart: int, order: Sequence[int]) -> list[int]:
+    """Return `count` vertices, the first ones possible in `order`, every two of which are `apart` segments apart."""
+    places: list[int] = []
+    near = [0] * len(order)
+    place = steps = 0
+    while len(places) < count:
+        place = next((k for k in range(place, len(order)) if not near[order[k]]), len(order))
+        steps += 1
+        if steps > MOST_STEPS or (place == len(order) and not places):
+            raise InputError(
+                f"{count} goals so far apart are not found on a road network of {len(order)} intersections",
+                field="goal_segments_apart",
+                value=apart,
+                expected="a smaller number, or fewer goals (number_goals_bounds)",
+            )
+        change = -1 if place == len(order) else 1
+        chosen = places.pop() if change < 0 else place
+        for v in _within(network, order[chosen], apart - 1):
+            near[v] += change
+        if change > 0:
+            places.append(chosen)
+        place = chosen + 1
+    return [order[k] for k in places]
+
+
+def _within(network: RoadNetwork, start: int, most: int) -> set[int]:
+    """Return the vertices at most `most` segments from `start` along the roads, itself included."""
+    found = latest = {start}
+    for _ in range(most):
+        latest = {network.lane_ends(lane)[1] for v in latest for lane in network.arms(v)} - found
+        if not latest:
+            break
+        found = found | latest
+    return found
 
 
 def draw_duration(bounds: tuple[int, int], draws: Draws) -> float:

@@ -162,7 +162,8 @@ class Recipe:
         if settings.goals is not None:
             return tuple(check_goal(network, goal, k) for k, goal in enumerate(settings.goals))
         low, high = settings.number_goals_bounds
-        return draw_goals(network, (low, high), Draws(seed, trial, Stream.GOALS))
+        draws = Draws(seed, trial, Stream.GOALS)
+        return draw_goals(network, (low, high), draws, settings.goal_segments_apart)
 
     def _duration(self, seed: int, trial: int) -> float:
         settings = self._settings

@@ -50,7 +50,7 @@ GoalBounds = Annotated[
     AfterValidator(_ordered),
 ]
 
-
+TrialCount = Annotated[int, Field(ge=1, le=limits.TRIALS)]
 Seconds = Annotated[float, Field(gt=0, le=limits.SECONDS)]
 Goals = Annotated[list[NetworkPoint], Field(max_length=limits.GOALS)]
 
@@ -184,9 +184,7 @@ class Settings0(Open):
     e_agents: list[AgentEntry0] = Field(
         default=[], alias="e-agents", max_length=limits.CARS, description="the e-agents"
     )
-    number_trials: Annotated[int, Field(ge=1, le=limits.TRIALS)] = Field(
-        default=1, description="number of trials"
-    )
+    number_trials: TrialCount = Field(default=1, description="number of trials")
     duration_bounds: DurationBounds = Field(
         default=[30, 90], description="[low, high], whole seconds, both included"
     )
@@ -264,9 +262,7 @@ class Settings(World):
     network: NetworkModel | None = Field(
         default=None, description="the network of each trial, or the file of one, instead of rnd"
     )
-    number_trials: Annotated[int, Field(ge=1, le=limits.TRIALS)] = Field(
-        default=1, description="number of trials"
-    )
+    number_trials: TrialCount = Field(default=1, description="number of trials")
     duration: Seconds | None = Field(
         default=None, description="duration of every trial, s, instead of duration_bounds"
     )
@@ -278,6 +274,9 @@ class Settings(World):
         description="goals of every trial, lattice points [x, y], instead of number_goals_bounds",
     )
     number_goals_bounds: GoalBounds = Field(default=[1, 4], description="[low, high], both included")
+    goal_segments_apart: Annotated[int, Field(ge=1, le=limits.INTERSECTIONS)] = Field(
+        default=1, description="how many segments drawn goals are apart at least, along the roads"
+    )
     ego: EgoModel = Field(default=EgoModel(), description="the ego")
 
     @model_validator(mode="after")

@@ -38,7 +38,7 @@ _MORE_THAN_NOTHING = {
     "forfeit_time": "who is first at a crossing would lose its place at once (E3)",
 }
 """Parameters that must not be 0, and what were wrong."""
-NO_LENGTHS = ("_time", "_rounds", "_lengths")
+NO_LENGTHS = ("_time", "_rounds", "_lengths", "_share")
 """Ends of the names of fractional parameters that are no lengths, nor lengths by second."""
 
 
@@ -130,6 +130,8 @@ class RuleParameters:
     """A verdict says whether the culprit was within the sensing radius in this last time."""
     gap_rounds: float = 10.0
     """satisfied: no gap between visits of a goal over this many free-flow rounds."""
+    gap_share: float = 0.5
+    """satisfied: no gap between visits of a goal over this share of the planned duration."""
     assume_e1: int = 1
     """Whether the problem assumes E1 of the e-agents, 0 or 1; so for E2 to E6."""
     assume_e2: int = 1

@@ -37,6 +37,7 @@ UNITS: Final = {
     "tickets": "tickets",
     "exceptions": "breaches",
     "edition": "",
+    "_share": "",
 }
 """The unit of a parameter of the rules, by the end of its name; all others are in metres, or switches."""
 
@@ -184,11 +185,15 @@ def _line(configuration: Configuration) -> str:
     parts = (
         f"{own.number_trials} trials of {seconds} s",
         _roads(configuration),
-        f"{goals} goals",
+        f"{goals} goals" + _apart(own.goal_segments_apart),
         cars,
         judged,
     )
     return ", ".join(parts)
+
+
+def _apart(segments: int) -> str:
+    return f" at least {segments} segments apart" if segments > 1 else ""
 
 
 def _roads(configuration: Configuration) -> str:

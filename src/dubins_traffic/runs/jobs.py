@@ -57,13 +57,17 @@ class Job:
     show: bool = False
     metrics: tuple[str, ...] = ()
 
+    def drawn(self) -> Instance:
+        """Return the instance that it runs, drawn if it is not given."""
+        if self.instance is not None:
+            return self.instance
+        if self.configuration is None:
+            raise DubinsTrafficError("a job needs an instance or a configuration")
+        return draw(self.configuration, self.seed, self.trial)
+
     def run(self, cancelled: Event | None = None) -> Result:
         """Run the job here; `cancelled` interrupts it after at most one simulated second."""
-        instance = self.instance
-        if instance is None:
-            if self.configuration is None:
-                raise DubinsTrafficError("a job needs an instance or a configuration")
-            instance = draw(self.configuration, self.seed, self.trial)
+        instance = self.drawn()
         return run_trial(
             instance,
             controllers.made(partial(controllers.load, self.controller)),

@@ -13,6 +13,9 @@ from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.duration import planned_ticks
 from dubins_traffic.scoring.metric import Column, ScoreColumn
 
+RECURRENT = 2
+"""Visits of each goal after frame 0 that `satisfied` asks for (docs/rules.md#satisfied)."""
+
 Mask = np.ndarray[tuple[int, int], np.dtype[np.bool_]]
 
 
@@ -32,6 +35,12 @@ class GoalDiscs:
         x = frames.x[:, EGO, None] - self._centres[:, 0]
         y = frames.y[:, EGO, None] - self._centres[:, 1]
         return np.sqrt(x * x + y * y) < self._radius
+
+    def at_start(self, instance: Instance) -> list[bool]:
+        """Return for each goal whether the ego starts in its disc."""
+        start = instance.starts[EGO]
+        x, y = start.x - self._centres[:, 0], start.y - self._centres[:, 1]
+        return (np.sqrt(x * x + y * y) < self._radius).tolist()
 
     def at(self, frames: Frames) -> Ints:
         """Return the intersection whose disc holds the ego's centre at each frame, goal or not, (F,); -1: none."""
@@ -73,11 +82,16 @@ class GoalVisits:
 
 @dataclass(frozen=True, slots=True)
 class Visits:
-    """Visits of all goals, each goal once; `visited` is the share of them visited, 1 without goals."""
+    """Visits of all goals, each goal once.
+
+    `visited` is the share of them visited, 1 without goals; `recurrent` tells whether each was visited in at least
+    `RECURRENT` frames after frame 0.
+    """
 
     goals: tuple[GoalVisits, ...]
     visited: float
     rounds: int
+    recurrent: bool
 
 
 class Visiting:
@@ -172,7 +186,10 @@ class Visiting:
         gaps = np.maximum(self._gap, self._end - self._last) / self._rate
         rows = zip(self._discs.goals, self._visits.tolist(), gaps.tolist(), strict=True)
         visited = float((self._visits > 0).mean()) if len(self._visits) else 1.0
-        return Visits(tuple(GoalVisits(*row) for row in rows), visited, self._rounds.count)
+        at_start = {goal for tick, goal in self._order if tick == 0}
+        later = [count - (goal in at_start) for goal, count in enumerate(self._visits.tolist())]
+        found = tuple(GoalVisits(*row) for row in rows)
+        return Visits(found, visited, self._rounds.count, min(later, default=RECURRENT) >= RECURRENT)
 
 
 def rounds_with_share(rounds: int, done: int, goals: int) -> float:

@@ -137,7 +137,7 @@ def margins_of(scores: Iterable[Judged]) -> Floats:
     -------
     (B, len(MARGINS)) float64
         Metres, or `UNITS`; infinite where nothing could break the rule. Negative exactly if the ego broke the rule;
-        of liveness, exactly if a goal was not visited, or a gap was too long.
+        of liveness, exactly if a goal was not visited twice after frame 0, or a gap was too long.
     """
     return np.array([_row(score) for score in scores]).reshape(-1, len(MARGINS))
 
@@ -154,7 +154,7 @@ def _row(score: Judged) -> list[float]:
         row.append(min(value, -SURE) if rule in broken else max(value, SURE))
     limit, gap = verdict.gap_limit_s, verdict.longest_gap_s
     spare = math.inf if limit is None or gap is None else limit - gap
-    missed = score.goals_visited < 1.0 or spare < 0.0
+    missed = not verdict.recurrent or spare < 0.0
     return [*row, min(spare, -SURE) if missed else max(spare, SURE)]
 
 

@@ -21,7 +21,7 @@ from dubins_traffic.scoring.clean import is_clean
 from dubins_traffic.scoring.collisions import Collision, Collisions
 from dubins_traffic.scoring.driving import Driven
 from dubins_traffic.scoring.duration import early_rounds, planned_ticks, ran_whole
-from dubins_traffic.scoring.goals import GoalVisits, Visits, rounds_with_share
+from dubins_traffic.scoring.goals import RECURRENT, GoalDiscs, GoalVisits, Visits, rounds_with_share
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE, weight_of
 from dubins_traffic.scoring.margins import entries_by_rule, margins_by_rule
 from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginRules, MarginTables, find_margins
@@ -145,7 +145,13 @@ def _visits(instance: Instance, rows: Sequence[GoalCounts], rounds: int) -> Visi
         for goal, row in zip(goals, rows, strict=True)
     ]
     visited = sum([row.visits > 0 for row in rows]) / len(rows) if rows else 1.0
-    return Visits(tuple(found), visited, rounds)
+    fewest = min([row.visits for row in rows], default=RECURRENT)
+    if fewest == RECURRENT:
+        at_start = GoalDiscs(instance).at_start(instance)
+        fewest = min(
+            [row.visits - there for row, there in zip(rows, at_start, strict=True)], default=RECURRENT
+        )
+    return Visits(tuple(found), visited, rounds, fewest >= RECURRENT)
 
 
 def _collisions(instance: Instance, contacts: Sequence[Contact]) -> tuple[tuple[Collision, ...], int]:

@@ -2,20 +2,20 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.rules import breach_log
 from dubins_traffic.rules.clauses import clause
 from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.parameters import EDITION, RuleParameters
 from dubins_traffic.rules.tables import ticks
 from dubins_traffic.scoring.collisions import Collision
+from dubins_traffic.scoring.duration import planned_ticks
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.goals import Visits
 from dubins_traffic.scoring.nearness import is_near
@@ -134,8 +134,10 @@ class Verdict:
     collisions : tuple of Collision
         The ego's, with the fault as found here.
     rounds : int
-        Rounds of visits; `longest_gap_s` is the longest gap between visits of a goal (None without goals) and
-        `gap_limit_s` the longest that `satisfied` allows (None if there is no round through all goals).
+        Rounds of visits; `longest_gap_s` is the longest gap between visits of a goal and `gap_limit_s` the longest that
+        `satisfied` allows (both None without goals).
+    recurrent : bool
+        Whether every goal was visited at least twice after frame 0.
     formulas : dict
         The verdict on each formula so far, in four values.
     robustness : dict
@@ -152,6 +154,7 @@ class Verdict:
     rounds: int
     longest_gap_s: float | None
     gap_limit_s: float | None
+    recurrent: bool
     formulas: dict[str, Status]
     robustness: dict[str, float | None]
 
@@ -188,6 +191,7 @@ class Verdict:
             "rounds": self.rounds,
             "longest_gap_s": self.longest_gap_s,
             "gap_limit_s": self.gap_limit_s,
+            "recurrent": self.recurrent,
             "formulas": dict(self.formulas),
             "robustness": dict(self.robustness),
             "edition": EDITION,
@@ -237,17 +241,15 @@ def reach_verdict(
     by_controller
         Whether the ego's controller ended the trial: then it is not cut.
     """
-    from dubins_traffic.routing.rounds import round_time  # compiles; only where there is something to judge
-
     rate = instance.problem.rate
     violations = tuple([_violation(instance, breach) for breach in breaches])
     own = [breach for breach in breaches if breach.car == EGO]
     fall = first_fall(breaches, rules, rate) if breaches else None
     gap = max([goal.longest_gap_s for goal in visits.goals], default=None)
-    limit = rules.gap_rounds * round_time(instance.problem)
+    limit = gap_limit(instance, rules) if visits.goals else None
     excuse, near = None, None
     if not own:
-        done = whole and visits.visited == 1.0 and (gap is None or gap <= limit)
+        done = whole and visits.recurrent and (gap is None or limit is None or gap <= limit)
         ruling = Ruling.SATISFIED if done else Ruling.UNFINISHED
     elif fall is None or fall[1].tick > own[0].tick:
         ruling = Ruling.VIOLATED
@@ -267,10 +269,24 @@ def reach_verdict(
         collisions,
         visits.rounds,
         gap,
-        limit if math.isfinite(limit) else None,
+        limit,
+        visits.recurrent,
         _formulas(rules, rate, breaches, visits, visited_now, running),
         margins,
     )
+
+
+def gap_limit(instance: Instance, rules: RuleParameters) -> float:
+    """Return the longest gap between visits of a goal that `satisfied` allows, seconds (docs/rules.md#satisfied)."""
+    planned = planned_ticks(instance) / instance.problem.rate
+    return min(rounds_limit(instance.problem, rules), rules.gap_share * planned)
+
+
+def rounds_limit(problem: Problem, rules: RuleParameters) -> float:
+    """Return the part of `gap_limit` that does not depend on the duration, seconds; inf if there is no round."""
+    from dubins_traffic.routing.rounds import round_time  # compiles; only where there is something to judge
+
+    return rules.gap_rounds * round_time(problem)
 
 
 def _violation(instance: Instance, breach: Breach) -> Violation:
