@@ -18,10 +18,9 @@ from dubins_traffic.falsification.journal import Journal
 from dubins_traffic.falsification.sampling import Source, prepared
 from dubins_traffic.falsification.trying import Laboratory, Tried, in_order
 from tests.campaigns import COMMAND
-
-TRIALS = 12
 from tests.minute import a_minute
 
+TRIALS = 12
 PATIENT = """
 import time
 from pathlib import Path
