@@ -75,7 +75,7 @@ class Page:
 
 
 GAPS = 'version = 0\ntrials = 2\ncontrollers = ["lanes", "simple"]\nconfigurations = ["demo"]\n'
-OLD = dumps({**SQUARE, "rules": {"edition": 1}})
+OLD = dumps({**SQUARE, "rules": {"edition": 2}})
 MISSPELT = dumps({**SQUARE, "formulas": {"soon back": "[] (lefd_ego -> <>[0,4] !lefd_ego)"}})
 FEW = dumps(
     {

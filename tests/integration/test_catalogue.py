@@ -46,14 +46,14 @@ def test_rules_with_defaults_and_units(capsys):
     for own in catalogue.rules():
         assert own.default == getattr(RuleParameters(), own.name)
         assert len(own.meaning) > 10, own.name
-        counted = re.search(r", (s|m|m/s|rounds|lengths|roads|tickets|breaches)$", own.meaning)
+        counted = re.search(r", (s|m|m/s|rounds|lengths|roads|tickets|breaches|share)$", own.meaning)
         assert (counted is None) == (own.name == "edition" or own.name.startswith("assume_")), own.name
 
 
 def test_configurations_with_a_line_each(capsys):
     lines = listed(capsys, "configurations").splitlines()
     assert [line.split()[0] for line in lines] == shipped_names()
-    assert all(re.search(r"\d+ trials of .* s, .* goals, .*judged", line) for line in lines)
+    assert all(re.search(r"\d+ trials of .* s, .* goals.*, .*judged", line) for line in lines)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,6 @@ from tests.campaigns import COMMAND
 from tests.minute import a_minute
 
 TRIALS = 12
-
 PATIENT = """
 import time
 from pathlib import Path

@@ -13,6 +13,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.drawing import Stream, draw_goals
 from dubins_traffic.roads.network import RoadNetwork
+from tests.shuttle import NAME, counted, document
 
 GRID = RoadNetwork.grid(3, 4)
 
@@ -89,3 +90,10 @@ def test_an_impossible_one_is_refused_by_name() -> None:
         InputError, match=r"goal_segments_apart.*2 goals so far apart are not found.*fewer goals"
     ):
         draw(load_config(document))
+
+
+def test_shuttling_wins_nothing_between_goals_apart() -> None:
+    """`python -m tests.shuttle 40` compares more; between two goals anywhere it wins."""
+    own = document(3, 3, 3, 2) | {"duration": 120}
+    shuttling, rules = counted(own, NAME, 2), counted(own, "rules", 2)
+    assert 0 < shuttling <= rules

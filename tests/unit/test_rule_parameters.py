@@ -54,8 +54,8 @@ def test_a_mapping_changes_what_it_names() -> None:
         ({"enter_time": 0.0}, "enter_time"),
         ({"forfeit_time": 0}, "forfeit_time"),
         ({"edition": 1}, "edition"),
-        ({"edition": 3}, "edition"),
-        ({"edition": 2.0}, "edition"),
+        ({"edition": 4}, "edition"),
+        ({"edition": 3.0}, "edition"),
         ({"edition": True}, "edition"),
         ({"edition": EDITION, "turnback": 0.3}, "turnback"),
     ],
@@ -88,20 +88,20 @@ def test_a_duration_is_so_many_ticks(duration: float, rate: float, expected: int
 
 
 def test_a_problem_names_the_edition_of_its_rules() -> None:
-    assert (EDITION, RuleParameters().to_mapping()["edition"]) == (2, 2)
+    assert (EDITION, RuleParameters().to_mapping()["edition"]) == (3, 3)
     document = {**load_config("town").to_document(), "rules": True}
     instance = draw(load_config(document), 0, 0)
     assert instance.problem.rules["edition"] == EDITION
     written = instance_to_document(instance)
     assert written["rules"]["edition"] == EDITION
     assert instance_from_document(written).problem.rules == instance.problem.rules
-    for named in (1, 3):
+    for named in (1, 2, 4):
         with pytest.raises(InputError, match="another edition of the rules of the road") as caught:
             instance_from_document({**written, "rules": {**written["rules"], "edition": named}})
         assert (caught.value.field, caught.value.value) == ("rules.edition", named)
         with pytest.raises(InputError, match="another edition"):
             load_config({**document, "rules": {"edition": named}})
-        header = encode(instance, "rules").replace(b'"edition":2', b'"edition":%d' % named)
+        header = encode(instance, "rules").replace(b'"edition":3', b'"edition":%d' % named)
         with pytest.raises(RecordError, match=r"instance\.rules\.edition: another edition"):
             decode(header)
     assert decode(encode(instance, "rules")).instance.problem.rules["edition"] == EDITION

@@ -326,7 +326,7 @@ def test_formulas_have_four_values() -> None:
     name = f"1.goal {goal[0]} {goal[1]}"
     assert visits(50, visit=[10], goals=[goal]).formulas[name] == "presumably false"
     assert visits(50, visit=[10, 49], goals=[goal]).formulas[name] == "presumably true"
-    assert visits(50, visit=[10], goals=[goal]).to_json()["edition"] == 2
+    assert visits(50, visit=[10], goals=[goal]).to_json()["edition"] == 3
     assert visits(50, visit=[10, 48, 49], goals=[goal]).formulas[name] == "presumably false"
     late = duel(GRID, 39, 39).formulas
     assert (late["2.left"], late["2.return"], late["3.stop"]) == (

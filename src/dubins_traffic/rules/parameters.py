@@ -10,8 +10,8 @@ from typing import Any
 
 from dubins_traffic.errors import InputError
 
-EDITION = 2
-"""The edition of the rules of the road that is judged; edition 1 had no `lingers` and differed in E3 to E6.
+EDITION = 3
+"""The edition of the rules of the road that is judged; docs/verdicts.md#editions says how others differed.
 
 Norm: docs/rules.md#edition.
 """

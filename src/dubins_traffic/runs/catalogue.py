@@ -37,7 +37,7 @@ UNITS: Final = {
     "tickets": "tickets",
     "exceptions": "breaches",
     "edition": "",
-    "_share": "",
+    "_share": "share",
 }
 """The unit of a parameter of the rules, by the end of its name; all others are in metres, or switches."""
 
