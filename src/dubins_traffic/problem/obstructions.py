@@ -24,6 +24,8 @@ STRETCH = 1.0 / 6.0
 def check_obstructions(problem: Problem) -> None:
     """Refuse a problem with rules in which a car could not leave a goal, or not come from one goal to another.
 
+    Norm: docs/rules.md#passable.
+
     Raises
     ------
     InputError

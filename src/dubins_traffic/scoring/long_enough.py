@@ -20,7 +20,10 @@ LOOKED_AT = 16
 
 
 def least_duration(instance: Instance) -> float:
-    """Return the seconds of two free-flow rounds; 0 without rules, or if no round goes through all goals."""
+    """Return the seconds of two free-flow rounds; 0 without rules, or if no round goes through all goals.
+
+    Norm: docs/rules.md#long-enough.
+    """
     from dubins_traffic.routing.rounds import round_time  # compiles; only where it is asked for
 
     once = round_time(instance.problem) if instance.problem.rules else math.inf
