@@ -155,6 +155,7 @@ def test_a_record_says_how_its_trial_ended(
 
 
 BY_FAULTY = ["suite", "run", "adversary-2026", "--controller", "own.py:Raises", "-o", "out", "--workers", "1"]
+BY_FAULTY += ["--in-process"]
 """The command that runs a controller that raises on a suite of cases."""
 
 
@@ -191,7 +192,7 @@ def test_cases_that_were_damaged_are_refused(capsys: pytest.CaptureFixture[str])
 def test_a_suite_of_trials(who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("mine.json").write_text(json.dumps(SUITE))
     arguments = ["suite", "run", "mine.json", "--controller", f"own.py:{who}", "--controller", "rules"]
-    assert main([*arguments, "-o", "out", "--workers", "1"]) == 1
+    assert main([*arguments, "-o", "out", "--workers", "1", "--in-process"]) == 1
     out, err = capsys.readouterr()
     lines = [[cell.strip() for cell in line.split("|")] for line in out.splitlines() if line.startswith("|")]
     table = {line[1]: dict(zip(lines[0], line, strict=True)) for line in lines[2:]}

@@ -135,12 +135,46 @@ def test_results_are_compared_and_other_hashes_refused(rules: list[Path], tmp_pa
     assert done.stdout == ""
 
 
+SEES_ITSELF = """
+import sys
+
+
+class Mine:
+    def start(self, problem):
+        self.inside = __file__.startswith("/submission")
+
+    def act(self, observation):
+        return (0.3, 0.0) if self.inside else None
+"""
+"""A controller that drives in a box, and gives up elsewhere."""
+
+
+@pytest.mark.parametrize("kind", ["trials", "cases"])
+def test_a_controller_that_is_not_ours_runs_in_a_box_and_the_results_say_so(
+    kind: str, tmp_path: Path
+) -> None:
+    file = written(tmp_path / "suite.json", document() if kind == "trials" else cases())
+    (tmp_path / "mine.py").write_text(SEES_ITSELF)
+    words = ["run", file, "--controller", "mine.py:Mine", "--controller", "rules", "--workers", "1"]
+    boxed = run(*words, "-o", tmp_path / "boxed", cwd=tmp_path)
+    assert boxed.returncode == 0, boxed.stderr
+    own, rules = json.loads(result(tmp_path / "boxed"))["entries"]
+    assert (own["controller"], own["ran"], rules["ran"]) == ("mine.py:Mine+sandbox", "boxed", "in process")
+    assert set(own["columns"]["end"]) == {"duration"}
+    assert "Where they ran: boxed: mine.py:Mine+sandbox; in process: rules." in boxed.stdout
+    told = run(*words, "--in-process", "-o", tmp_path / "own", cwd=tmp_path)
+    own, _ = json.loads(result(tmp_path / "own"))["entries"]
+    assert (own["controller"], own["ran"]) == ("mine.py:Mine", "in process")
+    assert set(own["columns"]["end"]) == {"gave_up"}
+    assert "Where they ran: in process: mine.py:Mine, rules." in told.stdout
+
+
 def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     campaign = document()["campaign"] | {"trials": 8, "controllers": ["slow.py:Slow"], "chunk": 4}
     file = written(tmp_path / "suite.json", document(campaign=campaign))
     (tmp_path / "slow.py").write_text(SLOW)
     out = tmp_path / "out"
-    words = [COMMAND, "suite", "run", str(file), "-o", str(out), "--workers", "1"]
+    words = [COMMAND, "suite", "run", str(file), "-o", str(out), "--workers", "1", "--in-process"]
     with subprocess.Popen(
         words, stderr=subprocess.PIPE, text=True, cwd=tmp_path, start_new_session=True
     ) as process:
@@ -152,12 +186,12 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
         assert process.wait(timeout=600) == 1
     assert "trials are kept, --resume goes on" in told
     (tmp_path / "go").touch()
-    refused = run("run", file, "-o", out, cwd=tmp_path)
+    refused = run("run", file, "-o", out, "--in-process", cwd=tmp_path)
     assert refused.returncode == 2
     assert "--resume goes on" in refused.stderr
-    done = run("run", file, "-o", out, "--resume", "--workers", "2", cwd=tmp_path)
+    done = run("run", file, "-o", out, "--resume", "--workers", "2", "--in-process", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
-    again = run("run", file, "-o", tmp_path / "again", "--workers", "2", cwd=tmp_path)
+    again = run("run", file, "-o", tmp_path / "again", "--workers", "2", "--in-process", cwd=tmp_path)
     assert again.returncode == 0, again.stderr
     assert result(out) == result(tmp_path / "again")
 
@@ -180,7 +214,7 @@ def interrupted(words: list[str], folder: Path, kept: Path) -> str:
 def test_ctrl_c_keeps_the_cases_that_are_finished(tmp_path: Path) -> None:
     file = written(tmp_path / "cases.json", cases(number=12))
     (tmp_path / "slow.py").write_text(SLOW)
-    words = [str(file), "--controller", "slow.py:Slow", "--workers", "1"]
+    words = [str(file), "--controller", "slow.py:Slow", "--workers", "1", "--in-process"]
     told = interrupted([*words, "-o", "out"], tmp_path, tmp_path / "out" / "cases.jsonl")
     assert "the cases that are finished are kept, --resume goes on" in told
     kept = len((tmp_path / "out" / "cases.jsonl").read_text().splitlines()) - 1

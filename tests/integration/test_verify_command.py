@@ -105,6 +105,7 @@ def test_json_for_machines(run: Run, record: Path) -> None:
             "the controller's name and the versions",
             "the sidecar",
         ],
+        "sheet": None,
     }
     difference = found[1]["difference"]
     assert (difference["what"], difference["tick"], difference["car"]) == ("bits", 0, "agent0")
@@ -150,6 +151,25 @@ def test_scores_that_were_printed_are_those_of_the_records(run: Run, config: Pat
     assert "score: recorded nothing, expected a score of trial-0001.mcap" in told
     Path("scores.json").write_text("{}")
     assert "no scores" in run("verify", *records, "--scores", "scores.json", status=2)
+
+
+def test_a_score_sheet_beside_the_records_is_checked_unasked(run: Run, config: Path) -> None:
+    printed = run("run", config, "--seed", "4", "--records", "out", "--trials", "2", "--json")
+    document = json.loads(printed[: printed.rindex("}") + 1])
+    records = sorted(Path("out").glob("*.mcap"))
+    sheet = Path("out/scores.json")
+    sheet.write_text(json.dumps(document))
+    assert run("verify", records[0]).strip() == f"{records[0]}: verified, with its score in {sheet}"
+    document["trials"][0]["ran"] = "boxed"
+    document["trials"][1]["counted_rounds"] += 1
+    sheet.write_text(json.dumps(document))
+    told = run("verify", *records, status=1).splitlines()
+    assert told[0] == f"{records[0]}: differs: score.ran: recorded boxed, expected in process"
+    assert told[1].startswith(f"{records[1]}: differs: score.counted_rounds: recorded ")
+    sheet.write_text(json.dumps({"trials": document["trials"][:1]}))
+    assert run("verify", records[1]).strip() == f"{records[1]}: verified"
+    sheet.write_text("[]")
+    assert "scores.json" in run("verify", records[1], status=2)
 
 
 def test_an_altered_sidecar_is_no_concern_of_it(run: Run, record: Path) -> None:

@@ -271,6 +271,7 @@ def test_the_score_as_json() -> None:
         "seed": 7,
         "end": "gave_up",
         "controller": "mine.py:Mine",
+        "ran": "in process",
         "record": "out/trial-3.mcap",
         "duration_s": 2.0,
         "rounds": 0,

@@ -13,6 +13,7 @@ import numpy as np
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.chunks import Cell
+from dubins_traffic.controllers.registry import ran
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.sink import FAULTS
@@ -140,7 +141,8 @@ def _schema(campaign: Campaign, kind: Kind) -> Any:
         return made.schema([part.field(name) for name in ("number", *rows.WALL)])
     identity = [("number", made.int64()), ("cell", made.int32()), ("configuration", made.string())]
     identity += [(FACTOR + name, _type(campaign, name)) for name in campaign.factors]
-    identity += [("controller", made.string()), ("trial", made.int64()), ("seed", made.uint64())]
+    identity += [("controller", made.string()), ("ran", made.string())]
+    identity += [("trial", made.int64()), ("seed", made.uint64())]
     rest = [part.field(name) for name in rows.results(campaign.columns) if name != "number"]
     return made.schema([*(made.field(*one) for one in identity), *rest])
 
@@ -163,10 +165,12 @@ def shaped(campaign: Campaign, part: Any, kind: Kind) -> Any:
         return part.select(schema.names).cast(schema)
     cells, controllers, trials = places(campaign, part["number"].to_numpy())
     own: list[Cell] = [campaign.cells[k] for k in cells.tolist()]
+    whose: list[int] = controllers.tolist()
     known: dict[str, list[Any]] = {
         "cell": cells.tolist(),
         "configuration": [cell.configuration for cell in own],
-        "controller": [campaign.controllers[k] for k in controllers.tolist()],
+        "controller": [campaign.controllers[k] for k in whose],
+        "ran": [ran(campaign.places[k]) for k in whose],
         "trial": trials.tolist(),
         "seed": [cell.seed for cell in own],
     }

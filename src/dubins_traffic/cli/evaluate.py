@@ -127,7 +127,8 @@ def _show(done: Evaluation, phase: Phase, folder: Path) -> None:
     from dubins_traffic.record.sink import BY_CONTROLLER
 
     several = len(phase.configurations) > 1
-    table = Table(title=f"{phase.name}, submission {done.submission[:12]}")
+    ran = dict.fromkeys(own.ran for own in done.results if own.ran is not None)
+    table = Table(title=", ".join([phase.name, f"submission {done.submission[:12]}", *ran]))
     where = ("configuration",) if several else ()
     for heading in ("trial", *where, "end", "rounds", "counted", "verdict", "collisions", "fault"):
         table.add_column(heading, justify="right" if heading in ("trial", "rounds", "counted") else "left")

@@ -113,6 +113,13 @@ TrialsOption = Annotated[
         help="Only the first N trials of each combination: no results of the whole suite.",
     ),
 ]
+InProcessOption = Annotated[
+    bool,
+    typer.Option(
+        "--in-process",
+        help="Run controllers of yours in this process, trusted, and not in boxes; the results say so.",
+    ),
+]
 SolverOption = Annotated[
     str | None,
     typer.Option(
@@ -136,6 +143,7 @@ def run(
     folder: FolderOption,
     controllers: ControllersOption = None,
     trials: TrialsOption = None,
+    in_process: InProcessOption = False,
     workers: options.Workers = None,
     resume: options.Resume = False,
     solver: SolverOption = None,
@@ -145,17 +153,23 @@ def run(
     from dubins_traffic.campaign import table
     from dubins_traffic.suites import cases
     from dubins_traffic.suites.comparing import open_sources
+    from dubins_traffic.suites.seats import seated
     from dubins_traffic.suites.suite import load_suite
     from dubins_traffic.suites.writing import PAGE, write_results
 
     found = load_suite(name)
     _check_options(found, controllers, trials, workers, solver)
+    named = controllers or []
+    if found.model.games is None and not in_process:
+        named, notice = seated(named or ([] if found.model.cases is not None else found.controllers))
+        if notice:
+            faults.tell(notice)
     if found.model.games is not None:
         path = _games(found, Path(folder), solver, seconds, resume=resume)
     elif found.model.cases is not None:
-        path = _cases(found, Path(folder), controllers or [], workers, resume=resume)
+        path = _cases(found, Path(folder), named, workers, resume=resume)
     else:
-        path = _trials(found, Path(folder), controllers or [], trials, workers, resume=resume)
+        path = _trials(found, Path(folder), named, trials, workers, resume=resume)
     report = Path(folder) / "report"
     print(write_results(found, open_sources([str(path)]), report, overwrite=True), end="")
     options.tell(str(path), str(report / PAGE))

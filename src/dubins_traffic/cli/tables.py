@@ -156,6 +156,8 @@ def score_table(sheet: ScoreSheet, width: int = WIDTH) -> Table:
     from rich import box
     from rich.table import Table
 
+    from dubins_traffic.controllers.registry import ran
+
     ranked = _ranked(sheet.trials)
     names = list(ranked)
     table = Table(box=box.SIMPLE_HEAD, show_footer=True, padding=0, title_justify="left", show_edge=False)
@@ -163,7 +165,8 @@ def score_table(sheet: ScoreSheet, width: int = WIDTH) -> Table:
     if len(names) > 1:
         table.add_column("controller", overflow="fold")
     else:
-        table.title = f"controller [b]{_safe(names[0])}[/b]"
+        where = ran(sheet.trials[0].controller)
+        table.title = f"controller [b]{_safe(names[0])}[/b]" + ("" if where is None else f", {where}")
     room = width - len("trial") - (1 + min(20, max(map(len, names))) if len(names) > 1 else 0)
     columns = _fitting(_needed(sheet.trials), sheet, room)
     for heading, column in columns.items():

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json as json_text
 from dataclasses import replace
-from typing import TYPE_CHECKING, Annotated, Any, cast
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.reader import Record
+    from dubins_traffic.verification.sheet import Scores
 
 EXAMPLES = options.examples(
     "verify out/*.mcap",
@@ -61,7 +62,10 @@ SimulatorOption = Annotated[
 ScoresOption = Annotated[
     str | None,
     typer.Option(
-        "--scores", metavar="FILE", help="What `run --json` or `score --json` printed of the records."
+        "--scores",
+        metavar="FILE",
+        help="What `run --json` or `score --json` printed of the records.",
+        show_default="scores.json beside a record, if it names it",
     ),
 ]
 
@@ -82,8 +86,10 @@ def verify(
     Trials of our simulator are run again from instance and recorded commands, and all is compared bit for bit. Exit
     status: 0 if all are verified, 1 if one differs, 2 if one can't be read.
     """
+    from dubins_traffic.verification.sheet import read_sheet
+
     expected = _expected(instance, configuration, rnd, seed, trial, simulator)
-    printed = None if scores is None else _scores(scores)
+    printed = None if scores is None else read_sheet(scores)
     found: list[dict[str, Any]] = []
     status = faults.OK
     for record in records:
@@ -100,7 +106,7 @@ def verify(
 def _outcome(
     record: str,
     expected: Callable[[Record], Instance] | None,
-    scores: list[dict[str, Any]] | None,
+    scores: Scores | None,
     *,
     quiet: bool,
 ) -> dict[str, Any]:
@@ -115,19 +121,6 @@ def _outcome(
     if not quiet:
         print(f"{record}: {result}")
     return {**result.to_json(), "record": record}
-
-
-def _scores(file: str) -> list[dict[str, Any]]:
-    """Return the scores in a file."""
-    from dubins_traffic.files import read_text
-    from dubins_traffic.problem.files import parse_json
-
-    trials = parse_json(read_text(file), file).get("trials")
-    if isinstance(trials, list):
-        entries = cast("list[Any]", trials)
-        if all(isinstance(entry, dict) for entry in entries):
-            return cast("list[dict[str, Any]]", entries)
-    raise InputError("no scores", file=file, field="trials", expected="what `run --json` prints")
 
 
 def _expected(

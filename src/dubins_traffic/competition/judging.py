@@ -15,6 +15,7 @@ from dubins_traffic.competition.boxed import boxed
 from dubins_traffic.competition.competition import Phase
 from dubins_traffic.competition.frames_hash import FramesHash
 from dubins_traffic.competition.submission import Submission
+from dubins_traffic.controllers import registry
 from dubins_traffic.errors import DubinsTrafficError, InputError, MissingExtraError
 from dubins_traffic.problem.faults import Strict, fault, parse
 from dubins_traffic.protocols import End
@@ -22,6 +23,7 @@ from dubins_traffic.record import header
 from dubins_traffic.record.writer import RecordEncoder
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.sandbox import owner_of
+from dubins_traffic.sandbox.controller import TRUST
 from dubins_traffic.scoring.columns import SECOND
 
 Owner = Literal["submission", "platform"]
@@ -52,6 +54,8 @@ class Judged:
         The tail of what the submission has printed.
     frames : str or None
         SHA-256 of all frames (`FramesHash`); None if it could not be run.
+    ran : str or None
+        Where the submission ran (`controllers.registry.ran`): boxed, or trusted with the limits that the machine has.
     recorded : bytes or None
         The record, if it was to be remembered.
     """
@@ -62,6 +66,7 @@ class Judged:
     owner: Owner | None = None
     log: str = ""
     frames: str | None = None
+    ran: str | None = None
     recorded: bytes | None = field(default=None, compare=False, repr=False)
 
     @property
@@ -78,6 +83,7 @@ class Judged:
             "owner": self.owner,
             "log": self.log,
             "frames": self.frames,
+            "ran": self.ran,
         }
 
     @staticmethod
@@ -93,6 +99,7 @@ class _Judged(Strict):
     owner: Owner | None
     log: str
     frames: str | None
+    ran: str | None = None
 
     @model_validator(mode="after")
     def _whole(self) -> _Judged:
@@ -175,7 +182,7 @@ def _judged(
     except InputError as error:
         return _failed(number, f"it can't be drawn: {error}")
     seat = boxed(submission, phase.limits, trust=trust)
-    name = submission.digest[:12]
+    name = registry.sandboxed(submission.digest[:12], TRUST if trust else "")
     recorded = io.BytesIO()
     memory = (RecordEncoder(recorded, header.encode(instance, name)),) if remember else ()
     try:
@@ -189,9 +196,8 @@ def _judged(
     row = rows.row(number, result.ending, result.score, {})
     end = result.ending.end.value
     own = {name: _plain(row[name]) for name in rows.RESULT}
-    return Judged(
-        number, own, end, OWNERS.get(end), seat.log_tail, digest.result(), recorded.getvalue() or None
-    )
+    log, frames, kept = seat.log_tail, digest.result(), recorded.getvalue() or None
+    return Judged(number, own, end, OWNERS.get(end), log, frames, registry.ran(name), kept)
 
 
 def _failed(number: int, reason: str) -> Judged:

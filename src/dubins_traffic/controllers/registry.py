@@ -16,6 +16,11 @@ from dubins_traffic.protocols import Controller
 if TYPE_CHECKING:
     from dubins_traffic.shield.tables import Overtakes
 
+IN_PROCESS, BOXED, TRUSTED, ELSEWHERE = "in process", "boxed", "trusted", "elsewhere"
+"""Where a controller ran: in this process, which trusts it; in a box; told to be trusted, with the limits that the
+machine has; as a program at the other end of a transport."""
+TRANSPORTS = frozenset({"ros1", "ros2", "lcm", "lines", "stdio"})
+"""What a driver at the other end of a transport is called."""
 COMPILED = "rules"
 """The compiled controller: in a batch no Python runs between two ticks of its trials."""
 SHIELDED = "+shield"
@@ -129,6 +134,24 @@ def sandboxed(spec: str, limits: str = "") -> str:
     if named.SANDBOX.search(bare) is None:
         bare += named.SANDBOXED + (f",{limits}" if limits else "")
     return bare + ending
+
+
+def ran(name: str | None) -> str | None:
+    """Return where a controller of that name ran, of IN_PROCESS, BOXED, TRUSTED, ELSEWHERE; None without a name."""
+    bare = _SHIELD.sub("", name or "")
+    box = named.SANDBOX.search(bare)
+    if box is not None:
+        return TRUSTED if "trust" in box["limits"].split(",") else BOXED
+    if bare in TRANSPORTS:
+        return ELSEWHERE
+    return IN_PROCESS if bare else None
+
+
+def is_ours(spec: str) -> bool:
+    """Tell whether our code alone drives: a built-in controller, a record, or a strategy or policy in a file."""
+    bare = _SHIELD.sub("", spec)
+    data = bare.endswith((".mcap", ".npz")) or named.foreign(bare) is not None
+    return bare in named.BUILT_IN or data or bare.startswith("dubins_traffic.")
 
 
 def dressed(spec: str, *, shield: bool = False, sandbox: str | None = None) -> str:

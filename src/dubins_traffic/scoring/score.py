@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from dubins_traffic.cars.state import Frames
+from dubins_traffic.controllers.registry import ran
 from dubins_traffic.display import Pictured, Tabulated, count
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.header import bare_name
@@ -47,7 +48,7 @@ class Score(Tabulated):
     end : str or None
         Why the trial ended; None for a record that was cut off.
     controller, record : str or None
-        Name of the ego's controller; path of the record.
+        Name of the ego's controller, beside which `to_json` says where it `ran`; path of the record.
     duration_s : float
         Simulated seconds up to the last frame.
     rounds : int
@@ -132,10 +133,10 @@ class Score(Tabulated):
         document: dict[str, Any] = {}
         for name in self.__slots__:
             value = getattr(self, name)
-            if name == "collisions":
-                document[name] = [collision.to_json() for collision in self.collisions]
-            elif name == "formulas":
-                document[name] = [formula.to_json() for formula in self.formulas]
+            if name in ("collisions", "formulas"):
+                document[name] = [own.to_json() for own in value]
+            elif name == "controller":
+                document |= {name: value, "ran": ran(value)}
             elif name == "goals":
                 document[name] = [{**asdict(goal), "goal": list(goal.goal)} for goal in self.goals]
             elif name == "metrics":

@@ -107,6 +107,7 @@ def run_cases(
             {
                 "controller": name,
                 "file": hash_of_file(spec),
+                "ran": controllers.ran(spec),
                 "columns": played({column: own[column] for column in (*KEPT, STRATEGY_SHARE)}),
             }
             for (name, own), spec in zip(columns.items(), specs, strict=True)

@@ -162,6 +162,15 @@ def shares(sources: Sequence[Source]) -> list[str]:
     return lines
 
 
+def where_they_ran(sources: Sequence[Source]) -> str:
+    """Return a sentence on which entries ran in a process that trusts them and which in a box; empty without any."""
+    found: dict[str, list[str]] = {}
+    for one in named_entries(sources):
+        found.setdefault(one.entry.ran or "not said", []).append(one.name)
+    listed = "; ".join(f"{where}: {', '.join(found[where])}" for where in sorted(found))
+    return f"Where they ran: {listed}." if found else ""
+
+
 def _part(campaign: Campaign, index: int, one: Named) -> Any:
     """Return the trials of an entry with the numbers that they have in a campaign, as controller number `index`."""
     numbers = [
@@ -179,6 +188,7 @@ def _made(suite: Suite, named: Sequence[Named]) -> Mapping[str, Any]:
     codes = {one.source.found.code: one.source.found.package for one in named}
     (code, package), *others = codes.items()
     versions = {"suite": suite.name, "dubins-traffic": package}
+    versions |= {f"{one.name} ran": one.entry.ran for one in named if one.entry.ran is not None}
     for one in named:
         if one.source.found.code in dict(others):
             versions[f"code of {one.name}"] = f"{one.source.found.code} ({one.source.found.package})"

@@ -23,6 +23,10 @@ class TrialsEntry(Strict):
 
     controller: Entry = Field(description="its name in tables")
     file: Digest | None = Field(default=None, description="SHA-256 of its file, if it is one in Python")
+    ran: Literal["in process", "boxed", "trusted"] | None = Field(
+        default=None,
+        description="where it ran: in process (trusted), in a box, or told to be trusted; null: not said",
+    )
     columns: Columns = Field(
         description="columns of the campaign's table, one value a trial, cell after cell"
     )

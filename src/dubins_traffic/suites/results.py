@@ -9,6 +9,7 @@ from typing import Any
 
 from dubins_traffic.campaign import manifest, rows, table
 from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.controllers.registry import ran
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import is_file, read_text, write_text
 from dubins_traffic.problem.faults import parse
@@ -48,7 +49,8 @@ def save_trials(suite: Suite, campaign: Campaign, folder: Path) -> Path:
         picked, times = found.take(own), clock.take(own)
         share = [STRATEGY_SHARE] if STRATEGY_SHARE in found.column_names else []
         columns = played({column: picked[column].to_pylist() for column in (*KEPT, *share)})
-        entries.append({"controller": name, "file": known["controllers"][k]["file"], "columns": columns})
+        file, where = known["controllers"][k]["file"], ran(campaign.places[k])
+        entries.append({"controller": name, "file": file, "ran": where, "columns": columns})
         seconds[name] = {column: times[column].to_pylist() for column in rows.WALL}
     return save(suite, folder, {"trials": campaign.model.trials, "entries": entries}, {"entries": seconds})
 

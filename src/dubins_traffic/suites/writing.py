@@ -9,7 +9,7 @@ from dubins_traffic.campaign.report.csv_tables import csv_files
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.files import make_folder, require_output, write_text
 from dubins_traffic.suites.cases_page import cases_page, cases_table, columns_of
-from dubins_traffic.suites.comparing import Source, compare_trials, made_by, shares
+from dubins_traffic.suites.comparing import Source, compare_trials, made_by, shares, where_they_ran
 from dubins_traffic.suites.games_page import answers_of, games_page, games_table
 from dubins_traffic.suites.markdown import trials_table
 from dubins_traffic.suites.suite import Suite
@@ -26,8 +26,9 @@ def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
     InputError
         As `compare_trials`, `columns_of` and `answers_of`.
     """
-    how = made_by(sources)
-    note = "".join(f"\n{line}\n" for line in (*shares(sources), how))
+    told = [line for line in (where_they_ran(sources), made_by(sources)) if line]
+    how = " ".join(told)
+    note = "".join(f"\n{line}\n" for line in (*shares(sources), *told))
     if suite.model.cases is not None:
         found = columns_of(suite, sources)
         return {TABLE: cases_table(suite, found) + note, PAGE: cases_page(suite, found, how)}

@@ -50,6 +50,8 @@ class Verification:
         The version of this package that wrote the record.
     unchecked : tuple of str
         What could not be checked, and is taken as it was recorded.
+    sheet : str or None
+        The score sheet beside the record, whose score of it was computed again.
     """
 
     record: str | None
@@ -60,6 +62,7 @@ class Verification:
     end: str | None
     written_by: str
     unchecked: tuple[str, ...]
+    sheet: str | None = None
 
     @property
     def verified(self) -> bool:
@@ -75,7 +78,8 @@ class Verification:
             if self.world == OURS
             else f", in the world {self.world}: frames fit the bounds, contacts the poses"
         )
-        return f"verified{early}{only}"
+        score = "" if self.sheet is None else f", with its score in {self.sheet}"
+        return f"verified{early}{only}{score}"
 
     def to_json(self) -> dict[str, Any]:
         """Return the outcome as a JSON object."""
@@ -89,6 +93,7 @@ class Verification:
             "end": self.end,
             "written_by": self.written_by,
             "unchecked": list(self.unchecked),
+            "sheet": self.sheet,
         }
 
     def _versions(self) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from dubins_traffic.verification.again import trial_difference
 from dubins_traffic.verification.elsewhere import world_difference
 from dubins_traffic.verification.likeness import header_difference, instance_difference, score_difference
 from dubins_traffic.verification.result import OURS, Difference, Verification
+from dubins_traffic.verification.sheet import sheet_beside
 from dubins_traffic.verification.written import encoded, written_difference
 
 STANDARD_INPUT = "-"
@@ -44,6 +46,7 @@ def verify(
         taken to be it.
     scores : sequence of mapping, optional
         Scores that were printed as JSON (`Score.to_json`); the one that names the record's file must be the record's.
+        By default those of a file ``scores.json`` beside a record, if it names the record.
 
     Raises
     ------
@@ -60,7 +63,11 @@ def verify(
     name = os.fspath(record)
     stdin = name == STANDARD_INPUT
     data = reader.take_bytes(sys.stdin.buffer, name) if stdin else reader.read_bytes(Path(name))
-    return _verified(reader.from_bytes(data, name), data, instance, scores)
+    beside = None if stdin or scores is not None else sheet_beside(Path(name))
+    if beside is None:
+        return _verified(reader.from_bytes(data, name), data, instance, scores)
+    path, own = beside
+    return replace(_verified(reader.from_bytes(data, name), data, instance, own), sheet=str(path))
 
 
 def _verified(

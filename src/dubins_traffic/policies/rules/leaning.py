@@ -6,7 +6,7 @@ the middle of its lane and one that stands at the centre line, yet the lane is f
 
 from __future__ import annotations
 
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
 from dubins_traffic.policies.rules.seeing import SIDE
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
@@ -22,9 +22,20 @@ def leans(vehicle: Vehicle) -> bool:
     return beside < travel_of(vehicle) + GUARD
 
 
-@jit
-def lean(b: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
-    """Return how far left of its way a car drives past the bodies left of it, 0 or less, metres.
+@jit_inline
+def lean(b: int, n: int, offset: float, way: ReferencePath, near: int, traffic: Traffic) -> float:
+    """Return how far left of its way car n drives past the bodies left of it, 0 or less, metres; 0 while it passes.
+
+    `offset` (m) is where it would drive otherwise; `near` (count) cars are listed.
+    """
+    drivers = traffic.drivers
+    free = near == 0 or offset != 0.0 or drivers.car[b, n].aside != 0.0
+    return 0.0 if free or not leans(drivers.vehicle[b]) else away_from(b, way, near, traffic)
+
+
+@jit_rare
+def away_from(b: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
+    """Return how far left of its way a car keeps clear of the listed bodies left of it, 0 or less, metres.
 
     Its centre stays on the road. `near` (count) cars are listed.
     """

@@ -26,7 +26,7 @@ from dubins_traffic.policies.rules.command_cache import (
     repeat_command,
 )
 from dubins_traffic.policies.rules.exits import count_visit, take_lane, ticks_of, watch_ego
-from dubins_traffic.policies.rules.leaning import lean, leans
+from dubins_traffic.policies.rules.leaning import lean
 from dubins_traffic.policies.rules.lists import LISTED, enlist, unlist_cars
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import PASSING_WAIT, find_way_past, keep_off
@@ -158,8 +158,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     leaves = car.kind != KIND.ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], car.lane)
     chooses = leaves and drivers.way[b, n].crossing != 0
     free = company < COMPANY.CROWDED and just_drives(car)
-    if free and chooses:
-        free = keeps_exit(b, n, tick, drivers.way[b, n], traffic)
+    free = free and (not chooses or keeps_exit(b, n, tick, drivers.way[b, n], traffic))
     if free and company != COMPANY.ALONE:
         free = meets_nobody(b, n, part, key, left, x, y, way, state, vehicle)
     if free and drive_freely(b, n, part, left, px, py, outside, chooses, way, traffic, commands):
@@ -182,8 +181,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         speed, kept = follow(b, n, speed, gap, who, rides, part, way, traffic)
     speed = dawdle(b, n, speed, -way_to_go(way, x, y), near, traffic)
     speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
-    if close and offset == 0.0 and car.aside == 0.0 and leans(vehicle):
-        offset = lean(b, way, near, traffic)
+    offset += lean(b, n, offset, way, near if close else 0, traffic)
     if leaves:
         find_way_out(b, n, tick, part, traffic)
     bend = way.bend if part == PART.THROUGH else 0.0
