@@ -1,6 +1,6 @@
 #!/bin/sh
 # Install the system packages that the tests need: Chromium and its driver, for the tests of pages; nginx, PostgreSQL and
-# SQLite's command, for the tests of the service; libraries that the programs of SUMO's wheel are linked with; ROS 1, a compiler and Fast DDS, for the tests over ROS 1 and 2;
+# SQLite's command, for the tests of the service; libraries that LCM's wheel and the programs of SUMO's are linked with; ROS 1, a compiler and Fast DDS, for the tests over ROS 1 and 2;
 # bubblewrap, libseccomp and podman, for boxes (docs/sandbox.md), and QEMU, for a kernel of its own. Does nothing where they
 # are, and says in one line what it can't install; the status is 0 either way.
 set -eu
@@ -16,7 +16,7 @@ installed() {
     for package in "$@"; do dpkg -s "$package" >/dev/null 2>&1 || return 1; done
 }
 
-libraries="libx11-6 libxext6 libxrender1 libgl1 libatomic1"
+libraries="libglib2.0-0 libx11-6 libxext6 libxrender1 libgl1 libatomic1"
 
 missing=""
 has chromium chromedriver || missing="chromium chromium-driver"

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shlex
 import signal
 import subprocess
@@ -123,8 +124,11 @@ def test_each_fault_is_named(faulty: str) -> None:
         "ends cleanly": False,
     }
     details = " ".join(finding.detail for finding in found.findings)
-    for word in ("no way", "one goal", "tick 9", "7 m/s", "can't close", "30 of"):
+    for word in ("no way", "one goal", "tick 9", "7 m/s", "can't close"):
         assert word in details, details
+    late = re.search(r"(\d+) of \d+ answers later", details)
+    assert late is not None, details
+    assert int(late[1]) >= 30, "others may be late, too, on a busy machine"
 
 
 def test_what_differs_from_run_to_run_is_found(faulty: str, capsys: pytest.CaptureFixture[str]) -> None:

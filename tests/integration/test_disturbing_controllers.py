@@ -159,3 +159,42 @@ def test_a_system_without_locks_is_refused_with_a_word() -> None:
     )
     said = "dubins-traffic: this system has no locks for files (fcntl): Linux or macOS is needed\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
+
+
+WITHOUT_SHARED_LOCKS = """
+import _multiprocessing, sys
+
+
+class Refused:
+    SEM_VALUE_MAX = 1
+
+    def __init__(self, *_):
+        raise PermissionError(13, "Permission denied")
+
+
+_multiprocessing.SemLock = Refused
+from dubins_traffic.cli.main import main
+
+sys.exit(main())
+"""
+"""The program on a machine whose /dev/shm is missing or may not be written, as in many a chroot."""
+
+
+@pytest.mark.parametrize(
+    "words",
+    [["run", "demo", "--jobs", "2"], ["campaign", "run", "c.toml", "-o", "out", "--workers", "2"]],
+    ids=lambda words: words[0],
+)
+def test_where_processes_share_no_lock_what_is_missing_is_named(words: list[str], tmp_path: Path) -> None:
+    (tmp_path / "c.toml").write_text(CAMPAIGN.replace("small.json", "demo"))
+    done = subprocess.run(
+        [sys.executable, "-c", WITHOUT_SHARED_LOCKS, *words],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (done.returncode, done.stdout) == (2, "")
+    last = done.stderr.splitlines()[-1]
+    assert last.startswith("dubins-traffic: no processes run beside this one")
+    assert "(Permission denied): /dev/shm must be there" in last

@@ -1,15 +1,18 @@
 import math
+import sys
 from concurrent.futures import ThreadPoolExecutor, wait
+from pathlib import Path
 
 import pytest
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.errors import InputError
+from dubins_traffic.errors import InputError, MissingExtraError, TransportError
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.problem.kinds import kind_of
 from dubins_traffic.protocols import End
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.inbox import Inbox
+from dubins_traffic.transports.lcm.connection import connect
 from dubins_traffic.transports.maestro import Maestro, Mode, Next, Phase
 from dubins_traffic.transports.shown import between, kept, onward
 
@@ -185,3 +188,27 @@ def test_a_package_and_executable_that_is_not_ours_is_remote() -> None:
     ]
     with pytest.raises(InputError, match="package/executable"):
         kind_of("my pkg/node")
+
+
+GONE = """
+try:
+    from ._lcm import LCM
+except ImportError:
+    from .Release import LCM
+"""
+
+
+def test_a_library_that_does_not_load_is_no_missing_extra(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where GLib is missing, LCM's wheel asks for another module of its own: its extra was asked for, and was there."""
+    monkeypatch.syspath_prepend(tmp_path)
+    for name in [name for name in sys.modules if name.partition(".")[0] == "lcm"]:
+        monkeypatch.delitem(sys.modules, name)
+    (tmp_path / "lcm").mkdir()
+    (tmp_path / "lcm" / "__init__.py").write_text(GONE)
+    with pytest.raises(TransportError, match=r"does not load.*apt-get install libglib2\.0-0"):
+        connect("udpm://239.255.76.67:7667?ttl=0")
+    monkeypatch.setitem(sys.modules, "lcm", None)
+    with pytest.raises(MissingExtraError, match="extra 'lcm'"):
+        connect("udpm://239.255.76.67:7667?ttl=0")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 from collections.abc import Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -13,7 +12,7 @@ from dubins_traffic.campaign.engines import Numbered, Outcome, Work
 from dubins_traffic.campaign.worker import Surroundings, run_part
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.runs.jobs import deaf_to_interrupts
-from dubins_traffic.runs.parent_watch import prepare_worker
+from dubins_traffic.runs.parent_watch import prepare_worker, spawning
 
 if TYPE_CHECKING:
     from multiprocessing.synchronize import Event
@@ -25,7 +24,7 @@ class Pool(Generic[Work]):
     def __init__(self, workers: int, around: Surroundings) -> None:
         self._workers = workers
         self._around = around
-        self._context = multiprocessing.get_context("spawn")
+        self._context = spawning()
         self._cancelled = self._context.Event()
         self._under_way: dict[Future[bytes], Work] = {}
         self._start()

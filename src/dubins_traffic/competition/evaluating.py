@@ -8,7 +8,6 @@ from __future__ import annotations
 import contextlib
 import errno
 import json
-import multiprocessing
 import os
 from collections.abc import Callable, Generator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -23,7 +22,7 @@ from dubins_traffic.competition.submission import Submission
 from dubins_traffic.errors import InputError, WorkerLostError
 from dubins_traffic.files import locked, read_text, replace_file
 from dubins_traffic.runs.jobs import deaf_to_interrupts
-from dubins_traffic.runs.parent_watch import prepare_worker
+from dubins_traffic.runs.parent_watch import prepare_worker, spawning
 
 RESULTS = "results.jsonl"
 
@@ -196,9 +195,7 @@ def _run(work: _Work, numbers: Sequence[int], workers: int) -> Generator[Judged]
 def _in_processes(work: _Work, numbers: Sequence[int], workers: int) -> Generator[Judged]:
     waiting = list(reversed(numbers))
     under_way: dict[Future[Judged], int] = {}
-    pool = ProcessPoolExecutor(
-        workers, mp_context=multiprocessing.get_context("spawn"), initializer=_begin, initargs=(work,)
-    )
+    pool = ProcessPoolExecutor(workers, mp_context=spawning(), initializer=_begin, initargs=(work,))
     try:
         while waiting or under_way:
             while waiting and len(under_way) < 2 * workers:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import signal
 from collections import deque
 from collections.abc import Generator, Iterator, Sequence
@@ -20,7 +19,7 @@ from dubins_traffic.errors import DubinsTrafficError, WorkerLostError
 from dubins_traffic.files import locked
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.runs.parent_watch import prepare_worker
+from dubins_traffic.runs.parent_watch import prepare_worker, spawning
 from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.simulators import registry as simulators
 
@@ -174,7 +173,7 @@ class _Crew:
     def __init__(self, workers: int) -> None:
         self.under_way: dict[Future[Result], Job] = {}
         self._workers = workers
-        self._context = multiprocessing.get_context("spawn")
+        self._context = spawning()
         self._cancelled = self._context.Event()
         self._pool = self._new()
 

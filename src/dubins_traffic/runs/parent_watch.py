@@ -1,4 +1,4 @@
-"""Ends a process when its parent process has ended, however that has happened."""
+"""Starts processes beside this one, and ends each when its parent has ended, however that has happened."""
 
 from __future__ import annotations
 
@@ -8,9 +8,30 @@ import signal
 import sys
 import threading
 from multiprocessing import connection
+from multiprocessing.context import SpawnContext
 from multiprocessing.util import Finalize
 
+from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.runs.left_threads import end_despite_threads
+
+
+def spawning() -> SpawnContext:
+    """Return what starts processes that share locks with this one.
+
+    Raises
+    ------
+    DubinsTrafficError
+        If this machine has no locks that processes share.
+    """
+    context = multiprocessing.get_context("spawn")
+    try:
+        context.Lock()
+    except OSError as error:
+        raise DubinsTrafficError(
+            f"no processes run beside this one, since they could share no lock ({error.strerror}): /dev/shm must be"
+            " there and may be written; one process alone needs none"
+        ) from None
+    return context
 
 
 def prepare_worker() -> None:

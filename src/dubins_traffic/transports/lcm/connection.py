@@ -70,14 +70,19 @@ def connect(url: str) -> LCM:
     MissingExtraError
         If the library is not installed.
     TransportError
-        If multicast packets have no way to go; the message holds the commands that make one.
+        If the library does not load for want of another, or multicast packets have no way to go; the message holds the
+        commands that help.
     InputError
         If `url` is no URL of LCM.
     """
     try:
         from lcm import LCM
     except ImportError as error:
-        raise MissingExtraError("LCM", "lcm") from error
+        if error.name == "lcm":
+            raise MissingExtraError("LCM", "lcm") from error
+        raise TransportError(
+            "LCM is installed and does not load: its wheel needs GLib; on Debian: apt-get install libglib2.0-0"
+        ) from error
     check_route(url)
     try:
         return LCM(url)
