@@ -11,6 +11,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
+from unittest.mock import patch
 
 import numpy as np
 from pyarrow import parquet
@@ -19,6 +20,8 @@ import dubins_traffic as dt
 from dubins_traffic.cli.main import main as command_line
 from dubins_traffic.logic.exports import FORMATS
 from dubins_traffic.logic.formula import FormulaError
+from dubins_traffic.problem import document as documents
+from dubins_traffic.problem import recipe
 from dubins_traffic.record.export import export
 from dubins_traffic.rules.task import task
 from dubins_traffic.synthesis.answer import answer
@@ -235,14 +238,14 @@ def exports(document: Mapping[str, Any], seed: int, _folder: Path) -> Parts:
 
 
 def campaign(text: str, folder: Path) -> Parts:
-    """Run a campaign and give its table's rows."""
+    """Run a campaign and give its table's rows, but for where its controllers ran, which is younger than the hashes."""
     (folder / "campaign.toml").write_text(text)
     status = command_line(
         ["campaign", "run", str(folder / "campaign.toml"), "-o", str(folder / "out"), "--workers", "1"]
     )
     assert status == 0
     table = parquet.read_table(folder / "out" / "results.parquet")
-    for name in table.column_names:
+    for name in table.drop_columns("ran").column_names:
         yield name, plain(table.column(name).to_pylist())
 
 
@@ -297,7 +300,14 @@ def _variants() -> dict[str, Case]:
             found[f"batch/{variant}/{controller.rpartition(':')[2]}"] = partial(
                 batch, document, controller, 11
             )
-    return found
+    old = [name for name in found if "/obstacles/" in name]
+    return found | {name: partial(_not_refused, found[name]) for name in old}
+
+
+def _not_refused(case: Case, folder: Path) -> Parts:
+    """Give a case whose first obstacle leaves a goal no free exit, which is refused by now; cars drive as they did."""
+    with patch.object(recipe, "check_obstructions"), patch.object(documents, "check_obstructions"):
+        yield from case(folder)
 
 
 def _others() -> dict[str, Case]:

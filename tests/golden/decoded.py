@@ -14,7 +14,7 @@ from dubins_traffic.viewer.replay import replay_page
 from tests.recordings import REALS, WHOLE
 
 _DATA = re.compile(r'<script[^>]*type="application/json"[^>]*>(.*?)</script>', re.DOTALL)
-_LEFT_OUT = ("record", "time_to_begin_s", "wall", "act_latency_s", "rounds_before_breach")
+_LEFT_OUT = ("record", "time_to_begin_s", "wall", "act_latency_s", "rounds_before_breach", "ran")
 _YOUNG = ("journey_lengths", "journey_start_time")
 
 
@@ -31,9 +31,9 @@ def decoded_score(score: dt.Score) -> bytes:
     """Return a score without the record's place and what a wall clock measured.
 
     What is said of `2.turn` but its breaches, the margins of rule 3, those of formulas, the rounds before the first
-    breach and whether the trial was cut are left out: they are younger than the hashes, and
-    `tests/property/test_margin_signs.py`, `test_formula_margins.py`, `test_batch.py` and
-    `tests/unit/test_score_tables.py` have them.
+    breach, whether the trial was cut and where its controller ran are left out: they are younger than the hashes, and
+    `tests/property/test_margin_signs.py`, `test_formula_margins.py`, `test_batch.py`,
+    `tests/unit/test_score_tables.py` and `tests/unit/test_where_they_ran.py` have them.
     """
     document = score.to_json()
     for formula in document["formulas"]:
