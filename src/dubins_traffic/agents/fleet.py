@@ -29,11 +29,12 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, table
-from dubins_traffic.problem.kinds import ALONE, COUNTER, KEEP_RULES, NUDGED, OWN
+from dubins_traffic.problem.kinds import ALONE, COUNTER, FREE, KEEP_RULES, NUDGED, OWN
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.agents.counter import CounterTeam
+    from dubins_traffic.agents.free import FreeCars
     from dubins_traffic.agents.lawful import Lawful
     from dubins_traffic.problem.instance import Instance
 
@@ -68,6 +69,9 @@ class Fleet:
         self._counter = _counter() if COUNTER in kinds else None
         if self._counter is not None:
             self._counter.reset(instances, state)
+        self._free = _free() if FREE in kinds else None
+        if self._free is not None:
+            self._free.reset(instances, state)
         self._own = OwnAgents() if OWN in kinds else None
         if self._own is not None:
             self._own.reset(instances, state)
@@ -91,6 +95,8 @@ class Fleet:
             self._lawful.decide(tick, state, labels, commands)
         if self._counter is not None:
             self._counter.decide(tick, state, labels, commands)
+        if self._free is not None:
+            self._free.decide(tick, state, labels, commands)
         if self._own is not None:
             self._own.decide(tick, state, labels, commands)
         if len(self._agents.recalled):
@@ -104,7 +110,7 @@ class Fleet:
     def reseed(self, seed: int) -> None:
         """Let what is drawn from now on follow from another seed."""
         self._agents.team["seed"] = seed
-        for team in (self._lawful, self._counter, self._own):
+        for team in (self._lawful, self._counter, self._free, self._own):
             if team is not None:
                 team.reseed(seed)
 
@@ -165,6 +171,13 @@ def _counter() -> CounterTeam:
     from dubins_traffic.agents.counter import CounterTeam
 
     return CounterTeam()
+
+
+def _free() -> FreeCars:
+    """Return the driver of the cars that do anything within E1 to E6."""
+    from dubins_traffic.agents.free import FreeCars
+
+    return FreeCars()
 
 
 def _teams(instances: Sequence[Instance], agents: Rows[Agent], net: Ints) -> Rows[Team]:

@@ -42,6 +42,10 @@ NetworkPoint = Annotated[
 ]
 """A point of a network's own frame; whole numbers are integers."""
 TimedCommand = Annotated[list[float], Field(min_length=3, max_length=3)]
+PATIENCE = (
+    "seconds it stands for others before it drives on past those not in its way, and turns round if "
+    "its way stays barred; null: it stands for ever"
+)
 
 
 class Wander(Strict):
@@ -79,11 +83,7 @@ class Loop(Strict):
     speed: Speed = Field(default=0.5, description="speed, m/s")
     yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
     stop_range: Distance = Field(default=0.5, description="gap to what is ahead at which it stops, m")
-    patience: Seconds | None = Field(
-        default=5.0,
-        description="seconds it stands for others before it drives on past those not in its way, and turns round if "
-        "its way stays barred; null: it stands for ever",
-    )
+    patience: Seconds | None = Field(default=5.0, description=PATIENCE)
 
 
 class Follow(Strict):
@@ -92,11 +92,7 @@ class Follow(Strict):
     gap: Distance = Field(default=1.0, description="distance kept behind the ego, along its path, m")
     speed: Speed = Field(default=0.5, description="largest speed, m/s")
     yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
-    patience: Seconds | None = Field(
-        default=5.0,
-        description="seconds it stands for others before it drives on past those not in its way, and turns round if "
-        "its way stays barred; null: it stands for ever",
-    )
+    patience: Seconds | None = Field(default=5.0, description=PATIENCE)
     sensing_only: bool = Field(
         default=False, description="whether it sees the ego within the sensing radius only"
     )
@@ -109,11 +105,7 @@ class Parked(Strict):
         default=30.0, description="seconds until it drives off; null: never"
     )
     speed: Speed = Field(default=0.5, description="speed once it drives, m/s")
-    patience: Seconds | None = Field(
-        default=5.0,
-        description="seconds it stands for others before it drives on past those not in its way, and turns round if "
-        "its way stays barred; null: it stands for ever",
-    )
+    patience: Seconds | None = Field(default=5.0, description=PATIENCE)
 
 
 class Scripted(Strict):
@@ -216,6 +208,22 @@ class Chosen(_Driver):
         return rows
 
 
+class Free(Strict):
+    """Does anything that E1 to E6 allow, by commands or at random; the law takes over before they are broken."""
+
+    boldness: Share = Field(
+        default=0.8, description="share of its time in which it does not do as the law says"
+    )
+    commands: list[TimedCommand] = Field(
+        default=[],
+        max_length=limits.COMMANDS,
+        description="[seconds, speed in m/s, yaw rate in rad/s]; none: at random",
+    )
+    repeat: bool = Field(
+        default=False, description="whether the commands begin again; else the law follows them"
+    )
+
+
 class Nudged(Strict):
     """Does what another kind asks for, late and with noise on its speed."""
 
@@ -264,6 +272,7 @@ class Remote(Strict):
 
 
 COUNTER = "counter"
+FREE = "free"
 REMOTE = "remote"
 NUDGEABLE: frozenset[str] = frozenset(
     {"wander", "loop", "follow", "parked", "scripted", "lawful", "nemesis", "chosen"}
@@ -280,6 +289,7 @@ KINDS: dict[str, type[Strict]] = {
     "lawful": Lawful,
     "nemesis": Nemesis,
     "chosen": Chosen,
+    FREE: Free,
     NUDGED: Nudged,
     COUNTER: Counter,
     REMOTE: Remote,
@@ -287,7 +297,7 @@ KINDS: dict[str, type[Strict]] = {
 """Kinds by name, each with the model of its parameters; `agents.kinds` says how they drive."""
 KEEP_RULES: frozenset[str] = frozenset({"lawful", "nemesis", "chosen"})
 """Kinds of e-agents that keep the rules of the road."""
-ALONE: frozenset[str] = frozenset({COUNTER, OWN, REMOTE})
+ALONE: frozenset[str] = frozenset({COUNTER, FREE, OWN, REMOTE})
 """Kinds of e-agents whose trials are not batched: a driver in Python or in another process decides."""
 
 NAMES_2016: Mapping[str, str] = {"wander/wander": "wander"}

@@ -18,13 +18,15 @@ from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.kernels.arrays import Bits, Ints
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.kernels.records import Rows
+from dubins_traffic.kernels.records import Grid, Rows
 from dubins_traffic.rules.breach_log import (
     RULE,
     RULES,
     BreachLog,
     EntryMargins,
     FoundBreach,
+    JudgedCar,
+    JudgedGoal,
     RefereeParameters,
     RefereeTables,
     pack_terms,
@@ -190,6 +192,16 @@ class Referee:
     def overdue(self) -> npt.NDArray[np.bool_]:
         """Which e-agents are on a journey that has taken longer than it may (E5), (B, N)."""
         return self._log.car["journey_over"] != 0
+
+    @property
+    def clocks(self) -> Grid[JudgedCar]:
+        """What is remembered of each car after the last frame, (B, N): it must not be changed."""
+        return self._log.car
+
+    @property
+    def goals(self) -> Rows[JudgedGoal]:
+        """What is remembered of the goals of all trials, one after the other: it must not be changed."""
+        return self._log.goal
 
     def ways(self, state: State) -> npt.NDArray[np.bool_]:
         """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, that of `state`."""

@@ -17,14 +17,14 @@ from dubins_traffic.agents.registry import names as agent_names
 from dubins_traffic.cars.dynamics import names as car_model_names
 from dubins_traffic.controllers.registry import names as controller_names
 from dubins_traffic.problem.configuration import Configuration, load_config, shipped_names
-from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, KINDS, REMOTE
+from dubins_traffic.problem.kinds import COUNTER, FREE, KEEP_RULES, KINDS, REMOTE
 from dubins_traffic.roads.formats.registry import names as format_names
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.registry import columns
 from dubins_traffic.scoring.registry import names as metric_names
 from dubins_traffic.simulators.registry import names as simulator_names
 
-KEEP_E1: Final = KEEP_RULES | {COUNTER}
+KEEP_E1: Final = KEEP_RULES | {COUNTER, FREE}
 """Kinds of e-agents that keep E1 unless they are told otherwise."""
 BREAKS_E1: Final = "can't keep E1: a problem that assumes E1 is not for it"
 UNKNOWN_E1: Final = "keeps E1 if its program does"
