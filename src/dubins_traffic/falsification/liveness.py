@@ -13,9 +13,10 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import replay
 from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.scoring.gap_limit import rounds_limit
 from dubins_traffic.scoring.goals import Visiting
 from dubins_traffic.scoring.margins import LIVENESS, SURE
-from dubins_traffic.scoring.verdict import EGO_RULES, rounds_limit
+from dubins_traffic.scoring.verdict import EGO_RULES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
