@@ -15,7 +15,6 @@ import dubins_traffic as dt
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.sandbox.available import available_layers
 from tests import gazebo
-from tests.minute import a_minute
 from tests.shown import ROOT
 from tests.tools import sumo_program
 
@@ -75,7 +74,7 @@ def recorded(configuration: str = "town", seed: int = 0, **options: Any) -> Call
 
     def put(folder: Path) -> None:
         (folder / "out").mkdir()
-        instance = dt.draw(a_minute(configuration), seed, 0)
+        instance = dt.draw(dt.load_config(configuration), seed, 0)
         dt.run_trial(instance, "lanes", record=folder / "out" / "trial-0000.mcap", **options)
         (folder / "instance.json").write_text(dumps(instance_to_document(instance)))
 

@@ -92,7 +92,6 @@ def run(
 ) -> None:
     """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
     from dubins_traffic.runs.plan import plan
-    from dubins_traffic.scoring.long_enough import short_notice
 
     todo = plan(
         source,
@@ -115,8 +114,6 @@ def run(
     )
     if todo.configuration is not None:
         maps.report(todo.configuration.network)
-    if not json:
-        faults.warn(short_notice([job.drawn for job in {job.trial: job for job in todo.jobs}.values()]))
     if todo.before:
         faults.tell(f"{todo.before} trials have their records in {records}; {len(todo.jobs)} are left")
     results, lost = _run(todo, jobs, records, json=json, hidden=controller == "keyboard")
@@ -134,7 +131,10 @@ def _run(
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.cli.tables import show
     from dubins_traffic.runs.jobs import run_trials
+    from dubins_traffic.scoring.long_enough import short_notice
 
+    if not json:
+        faults.warn(short_notice([job.drawn for job in {job.trial: job for job in todo.jobs}.values()]))
     results: list[Result] = []
     lost: WorkerLostError | None = None
     try:

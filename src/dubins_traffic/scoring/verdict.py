@@ -8,15 +8,15 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any, Final
 
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.problem.instance import Instance
 from dubins_traffic.rules import breach_log
 from dubins_traffic.rules.clauses import clause
 from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.parameters import EDITION, RuleParameters
 from dubins_traffic.rules.tables import ticks
 from dubins_traffic.scoring.collisions import Collision
-from dubins_traffic.scoring.duration import planned_ticks
 from dubins_traffic.scoring.formulas import Status
+from dubins_traffic.scoring.gap_limit import gap_limit
 from dubins_traffic.scoring.goals import Visits
 from dubins_traffic.scoring.nearness import is_near
 
@@ -274,19 +274,6 @@ def reach_verdict(
         _formulas(rules, rate, breaches, visits, visited_now, running),
         margins,
     )
-
-
-def gap_limit(instance: Instance, rules: RuleParameters) -> float:
-    """Return the longest gap between visits of a goal that `satisfied` allows, seconds (docs/rules.md#satisfied)."""
-    planned = planned_ticks(instance) / instance.problem.rate
-    return min(rounds_limit(instance.problem, rules), rules.gap_share * planned)
-
-
-def rounds_limit(problem: Problem, rules: RuleParameters) -> float:
-    """Return the part of `gap_limit` that does not depend on the duration, seconds; inf if there is no round."""
-    from dubins_traffic.routing.rounds import round_time  # compiles; only where there is something to judge
-
-    return rules.gap_rounds * round_time(problem)
 
 
 def _violation(instance: Instance, breach: Breach) -> Violation:
