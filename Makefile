@@ -42,7 +42,7 @@ test-all: test ## all tests, then those of which the suite runs a part, in full:
 	$(BIN)/python -m tests.judge_trials 2000 bent
 	DUBINS_TRAFFIC_CONTRACT=full $(BIN)/python -m pytest tests/conformance/test_contract.py \
 		tests/integration/test_free_agents.py
-	DUBINS_TRAFFIC_SUITE_TRIALS=4 $(BIN)/python -m pytest tests/integration/test_suite.py
+	DUBINS_TRAFFIC_SUITE_TRIALS=2 $(BIN)/python -m pytest tests/integration/test_suite.py
 	DUBINS_TRAFFIC_FAULTS=20 $(BIN)/python -m pytest tests/integration/test_service_faults.py \
 		tests/integration/test_service_full_disks.py tests/integration/test_service_ray.py
 	DUBINS_TRAFFIC_SERVED_TRIALS=1000 $(BIN)/python -m pytest tests/integration/test_served_frames.py

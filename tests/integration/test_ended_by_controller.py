@@ -164,10 +164,10 @@ def test_a_suite_of_cases_counts_no_crash_as_clean(capsys: pytest.CaptureFixture
         assert main([*BY_FAULTY, *more]) == 1
         out, err = capsys.readouterr()
         rows = {line.split(" | ")[0]: line for line in out.splitlines()}
-        assert "0 of 57" in rows["| clean"]
-        assert "| 57 |" in rows["| ended by the controller"]
+        assert "0 of 56" in rows["| clean"]
+        assert "| 56 |" in rows["| ended by the controller"]
         assert "| controller fault |" in out
-        assert "57 of 57 trials ended by a fault (57 controller_fault); the first: " in err
+        assert "56 of 56 trials ended by a fault (56 controller_fault); the first: " in err
         assert "RuntimeError: out of ideas" in err
     file = next(path for path in Path("out").glob("adversary-2026-*.json") if ".wall." not in path.name)
     document = json.loads(file.read_text())

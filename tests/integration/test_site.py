@@ -148,7 +148,7 @@ def test_the_numbers_of_the_results_are_those_of_the_files(site: Path) -> None:
         for k, entry in enumerate(file.get("entries", [])):
             columns = entry["columns"]
             if suite.model.cases:
-                assert rows["clean"][k].startswith(f"{sum(columns['clean'])} of 57 [")
+                assert rows["clean"][k].startswith(f"{sum(columns['clean'])} of 56 [")
                 continue
             cells = rows[entry["controller"]]
             values = [float(value or 0) for value in columns[suite.model.metric]]

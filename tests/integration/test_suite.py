@@ -49,7 +49,7 @@ def result(folder: Path) -> bytes:
 
 
 TRIALS = int(os.environ.get("DUBINS_TRAFFIC_SUITE_TRIALS", "1"))
-"""Trials of each combination of rules-2026; `make test-all` runs all four."""
+"""Trials of each combination of rules-2026; `make test-all` runs both."""
 
 
 @pytest.fixture(scope="module")

@@ -28,9 +28,9 @@ from dubins_traffic.suites.writing import TABLE, results, write_results
 from tests.suites import cases, document, games
 
 FROZEN = {
-    "adversary-2026": "dca1688bba9cd211fc915f0d2539513cb8529876683e9af42f2307b21b3b1722",
+    "adversary-2026": "a7c7766daccbd29453699c8f6d19cf0fd5c380a8409e632953a2b5abc5a3b7ba",
     "icra2016": "779b298b49a05cdbb1f444621be1f8253f8cb9d5ad46f2c60f965a9ecbcc9057",
-    "rules-2026": "718d8dd386133de6cc4a28b192f03fbd57e74cdf4e8f797d185d62125b0c4084",
+    "rules-2026": "c3ff293646d022682c30982af0c378c459983944a31ffa6eff17f8dd1e132f56",
     "synthesis-2026": "4b812b568a64dc977afc50517fe8f944e7142e62ed60e93efa8e3623975e8c60",
 }
 """What is shipped changes only before version 1.0.0: then a suite that should be another gets another name."""
@@ -94,8 +94,8 @@ def test_fewer_trials_are_the_first_ones() -> None:
     suite = load_suite("rules-2026")
     whole, few = suite.campaign(["simple"]), suite.campaign(["simple"], 1)
     assert [cell.seed for cell in few.cells] == [cell.seed for cell in whole.cells]
-    assert (whole.total, few.total) == (320, 80)
-    for count in (0, 5):
+    assert (whole.total, few.total) == (160, 80)
+    for count in (0, 3):
         with pytest.raises(InputError, match="trials: not a number of its trials"):
             suite.campaign(["simple"], count)
 
