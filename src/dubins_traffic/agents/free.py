@@ -1,4 +1,4 @@
-"""E-agents of the kind `free`: anything at all, as long as E1 to E6 are kept.
+"""E-agents of the kind `free`: much that E1 to E6 allow and no other kind does.
 
 A free car does as its commands say, or as a random walk does, until one of its clocks says that the law must take over:
 those of the referee for E3 to E6, early enough that the law (`policies.rules.policy`) still keeps them. Whatever it

@@ -209,7 +209,7 @@ class Chosen(_Driver):
 
 
 class Free(Strict):
-    """Does anything that E1 to E6 allow, by commands or at random; the law takes over before they are broken."""
+    """Does much that E1 to E6 allow and no other kind does, by commands or at random; the law takes over in time."""
 
     boldness: Share = Field(
         default=0.8, description="share of its time in which it does not do as the law says"
