@@ -178,7 +178,7 @@ PAGES: dict[str, Page] = {
         ),
         replaced=lambda: {
             "suite run rules-2026": "suite run few.json",
-            "ada=ada/rules-2026-c3ff29364602.json": "ada=$(ls ada/*) --suite few.json",
+            "ada=ada/rules-2026-c3ff293646d0.json": "ada=$(ls ada/*) --suite few.json",
             "suite run synthesis-2026": "suite run one.json",
         },
         before={"suite compare mine ada": typed("mkdir ada; cp mine/few-????????????.json ada")},

@@ -39,7 +39,7 @@ def verdict(ruling: str = "satisfied", *, fallen: bool = False, cut: bool = Fals
     formulas = {"E1": "false" if fallen or excused else "presumably true"}
     clean = ruling in ("satisfied", "unfinished") and not cut
     near = False if excused else None
-    found = Verdict(Ruling(ruling), clean, cut, excuse, near, (), (), 2, 1.0, 9.0, {}, {})
+    found = Verdict(Ruling(ruling), clean, cut, excuse, near, (), (), 2, 1.0, 9.0, True, {}, {})
     return replace(found, formulas=formulas)
 
 
