@@ -1,6 +1,6 @@
 """Each clause of the rules and each word of the glossary has one place in the package, and docs/where.md names it.
 
-A clause is implemented where a docstring says ``Norm: docs/rules.md#anchor``; others may cite it as they like. Slow
+A clause is implemented where a docstring names it after the word ``Norm:``; others may cite it as they like. Slow
 references in tests state clauses a second time, on purpose; they are no part of the package.
 """
 

@@ -49,7 +49,11 @@ def wander(start, **more):
 
 def test_names_say_what_the_kinds_do() -> None:
     own = {"wander", "loop", "follow", "parked", "scripted"}
-    assert set(names()) == set(KINDS) == own | {"lawful", "nemesis", "chosen", "nudged", "counter", "remote"}
+    assert (
+        set(names())
+        == set(KINDS)
+        == own | {"lawful", "nemesis", "chosen", "free", "nudged", "counter", "remote"}
+    )
     assert all(len(line) > 20 for line in names().values())
 
 
