@@ -24,7 +24,7 @@ NAME = "4.change"
 CONFIG = {
     **SHORT,
     "e-agents": [],
-    "obstacles": [{"disc": {"x": x, "y": y, "radius": 0.15}} for x, y in ((3, 6), (9, 6), (6, 3), (6, 9))],
+    "obstacles": [{"disc": {"x": x, "y": y, "radius": 0.14}} for x, y in ((3, 6), (9, 6), (6, 3), (6, 9))],
     "duration": 10.0,
     "end_on_collision": False,
 }

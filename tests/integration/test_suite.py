@@ -91,15 +91,15 @@ def first(entry: dict[str, Any], trials: int, of: int) -> dict[str, list[Any]]:
 def test_the_results_that_the_site_shows_are_these(rules: list[Path]) -> None:
     (kept,) = [entry for entry in shown("rules-2026")["entries"] if entry["controller"] == "rules"]
     (own,) = json.loads(result(rules[0]))["entries"]
-    assert own["columns"] == first(kept, TRIALS, 4)
+    assert own["columns"] == first(kept, TRIALS, 2)
 
 
-@pytest.mark.parametrize("name", ["icra2016", *(("adversary-2026", "synthesis-2026") if TRIALS == 4 else ())])
+@pytest.mark.parametrize("name", ["icra2016", *(("adversary-2026", "synthesis-2026") if TRIALS == 2 else ())])
 def test_every_controller_comes_to_the_results_that_the_site_shows(name: str, tmp_path: Path) -> None:
     """A trial of each combination; `make test-all` runs all of every suite."""
     suite, kept = load_suite(name), shown(name)
     options: list[str] = []
-    if suite.trials is not None and TRIALS != 4:
+    if suite.trials is not None and TRIALS != 2:
         options = ["--trials", "1"]
     if suite.model.cases is not None:
         options = [word for entry in kept["entries"] for word in ("--controller", entry["controller"])]
