@@ -105,7 +105,7 @@ def plain(found: Score) -> Mapping[str, Any]:
     return {
         name: value
         for name, value in found.to_json().items()
-        if name not in ("time_to_begin_s", "record", "controller")
+        if name not in ("time_to_begin_s", "record", "controller", "ran")
     }
 
 

@@ -65,7 +65,7 @@ def plain(found: Score) -> Mapping[str, Any]:
     return {
         name: value
         for name, value in found.to_json().items()
-        if name not in ("time_to_begin_s", "record", "controller")
+        if name not in ("time_to_begin_s", "record", "controller", "ran")
     }
 
 
@@ -274,7 +274,7 @@ class Stands(Gives):
 
 
 @pytest.mark.parametrize("driver", [Gives, Stands])
-def test_only_who_stays_to_the_end_is_satisfied_and_counts(driver: type[Gives], tmp_path) -> None:
+def test_only_who_stays_to_the_end_is_clean_and_counts(driver: type[Gives], tmp_path) -> None:
     config = configuration(**{"e-agents": []}, number_goals_bounds=[1, 1], duration_bounds=[2, 2])
     drawn = draw(config, SEED, 0)
     network = drawn.problem.network
@@ -290,7 +290,7 @@ def test_only_who_stays_to_the_end_is_satisfied_and_counts(driver: type[Gives], 
     assert single.verdict is not None
     whole = driver is Stands
     assert (single.rounds, single.counted_rounds) == (1, int(whole))
-    assert single.verdict.verdict == ("satisfied" if whole else "unfinished")
+    assert (single.verdict.verdict, single.verdict.clean) == ("unfinished", whole)
     assert single.verdict.longest_gap_s == 2.0, "gaps run to the planned end"
 
 

@@ -45,7 +45,7 @@ def _configured(**more: Any) -> Configuration:
 
 
 def _plain(found: Score) -> Mapping[str, Any]:
-    hidden = ("time_to_begin_s", "record", "controller")
+    hidden = ("time_to_begin_s", "record", "controller", "ran")
     return {name: value for name, value in found.to_json().items() if name not in hidden}
 
 
