@@ -60,6 +60,11 @@ def test_without_rules_nothing_is_refused() -> None:
     assert drawn(1, 3, [[0, 0], [2, 0]], BEYOND_A_DEAD_END, rules=False).problem.obstacles
 
 
+def test_without_goals_nothing_is_barred() -> None:
+    document = instance_to_document(drawn(1, 2, [[0, 0]], disc(3.0, 5.0, 0.2)))
+    assert instance_from_document(document | {"goals": []}).problem.goals == ()
+
+
 def test_the_way_back_is_no_exit_of_a_bend() -> None:
     beyond = disc(0.3, 1.5, 0.2)
     """In the lane out of the bend at (0, 0) along y: who comes by the other road has no other exit."""

@@ -31,7 +31,7 @@ def check_obstructions(problem: Problem) -> None:
     InputError
         Naming the obstacle and the intersection.
     """
-    if not problem.rules or not problem.obstacles:
+    if not problem.rules or not problem.obstacles or not problem.goals:
         return
     found = _Obstructions(problem)
     for v in problem.goal_vertices:
