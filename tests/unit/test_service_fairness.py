@@ -76,7 +76,7 @@ def results(numbers: list[int], frames: str = "f") -> list[dict[str, object]]:
         "replay": None,
         "own_replay": None,
     }
-    return [{"number": number, "frames": frames, **same} for number in numbers]
+    return [{"number": number, "frames": frames, "ran": "boxed", **same} for number in numbers]
 
 
 def test_what_was_cancelled_while_it_ran_does_not_run_again_for_the_same_price(office: Office) -> None:

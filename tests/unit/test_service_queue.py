@@ -83,6 +83,7 @@ def results(chunk: Chunk, frames: str = "f") -> list[dict[str, object]]:
             "owner": None,
             "log": "",
             "frames": frames,
+            "ran": "boxed",
             "replay": None,
             "own_replay": None,
         }

@@ -19,7 +19,7 @@ from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service.tables import Chunk, Standing, Trial
 
 NONCE: Final = 12
-HIDDEN: Final = {Trial: ("row", "end", "owner", "frames", "again"), Standing: ("places",)}
+HIDDEN: Final = {Trial: ("row", "end", "owner", "frames", "ran", "again"), Standing: ("places",)}
 """Columns that are hidden together."""
 Row = TypeVar("Row", Trial, Standing)
 

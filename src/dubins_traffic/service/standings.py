@@ -27,7 +27,7 @@ DAY = 86400.0
 def judged(trials: Sequence[Trial], *, logs: bool = False) -> list[Judged]:
     """Return results as the ranking reads them, with their logs if these have been read."""
     return [
-        Judged(own.number, own.row, own.end, own.owner, own.log if logs else "", own.frames)  # pyright: ignore[reportArgumentType]
+        Judged(own.number, own.row, own.end, own.owner, own.log if logs else "", own.frames, own.ran)  # pyright: ignore[reportArgumentType]
         for own in trials
     ]
 

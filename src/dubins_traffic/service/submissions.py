@@ -230,7 +230,7 @@ def record(
     chunk : Chunk
         The chunk, on lease.
     results : sequence of dict
-        For each of its trials, or its first, `number`, `row`, `end`, `owner`, `log`, `frames` and its replays.
+        For each of its trials, or its first, `number`, `row`, `end`, `owner`, `log`, `frames`, `ran` and its replays.
     at : float
         Now.
     hiding : Hiding
@@ -254,7 +254,7 @@ def record(
         for result in results:
             named = {name: result[name] for name in ("number", "replay", "own_replay")}
             trial = Trial(submission_id=submission.id, run=chunk.run, **named)
-            told = {name: result[name] for name in ("row", "end", "owner", "frames")}
+            told = {name: result[name] for name in ("row", "end", "owner", "frames", "ran")}
             hiding.keep(trial, told, result["log"])
             session.add(trial)
     chunk.numbers = numbers

@@ -171,7 +171,7 @@ class Chunk(Base):
 
 
 class Trial(Base):
-    """The result of a trial. `again` is the hash of its frames when it was run a second time.
+    """The result of a trial, and where the submission `ran`. `again` is the hash of its frames when it ran once more.
 
     In a phase that does not show all `hidden` holds it encrypted, and `log` too is (`service.hiding`). `own_replay` is
     a replay with the words of the controller, if it had any: its team sees that.
@@ -187,6 +187,7 @@ class Trial(Base):
     owner: Mapped[str | None] = mapped_column(String(20))
     log: Mapped[str] = mapped_column(Text)
     frames: Mapped[str | None] = mapped_column(String(64))
+    ran: Mapped[str | None] = mapped_column(String(20))
     again: Mapped[str | None] = mapped_column(String(64))
     replay: Mapped[str | None] = mapped_column(String(64))
     own_replay: Mapped[str | None] = mapped_column(String(64))

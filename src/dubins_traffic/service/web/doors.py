@@ -75,6 +75,7 @@ class Result(msgspec.Struct, forbid_unknown_fields=True):
     frames: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None
     replay: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None
     own_replay: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None
+    ran: Annotated[str, msgspec.Meta(max_length=20)] | None = None
 
 
 class Report(msgspec.Struct, forbid_unknown_fields=True):
