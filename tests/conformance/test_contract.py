@@ -34,6 +34,8 @@ BLOCKS = {
 """Scenes in which e-agents that break nothing still block the ego."""
 PROVOKES = {
     "ego_tilted": "a lawful car doesn't dare to leave a bend past an ego that stands tilted at the centre line",
+    "ego_beyond_crossing": "at 10 Hz a lawful car that leans away from a body enters a crossing without a stop",
+    "ego_whims": "a lawful car that leans away from a body loses its place at a line more than once",
 }
 """Scenes in which a clean ego still brings a lawful car to a breach."""
 
