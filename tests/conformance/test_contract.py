@@ -32,12 +32,6 @@ BLOCKS = {
     "ring": "cars that wait for one another round a ring owe nothing",
 }
 """Scenes in which e-agents that break nothing still block the ego."""
-PROVOKES = {
-    "ego_tilted": "a lawful car doesn't dare to leave a bend past an ego that stands tilted at the centre line",
-    "ego_beyond_crossing": "at 10 Hz a lawful car that leans away from a body enters a crossing without a stop",
-    "ego_whims": "a lawful car that leans away from a body loses its place at a line more than once",
-}
-"""Scenes in which a clean ego still brings a lawful car to a breach."""
 
 
 def _came(name: str) -> list[Came]:
@@ -66,7 +60,7 @@ def test_who_blocks_the_ego_breaks_a_rule(name: str) -> None:
     assert [one for one in came if one.waited > one.bound] == []
 
 
-@pytest.mark.parametrize("name", _marked(list(PROVOKING), PROVOKES))
+@pytest.mark.parametrize("name", list(PROVOKING))
 def test_no_clean_ego_brings_a_lawful_car_to_a_breach(name: str) -> None:
     came = _came(name)
     assert any(not one.own for one in came)

@@ -12,6 +12,7 @@ from dubins_traffic.policies.rules.seeing import SIDE
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath, on_way
 from dubins_traffic.policies.safety import GUARD, travel_of
+from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.rules.shape import half_extent
 
 
@@ -26,11 +27,28 @@ def leans(vehicle: Vehicle) -> bool:
 def lean(b: int, n: int, offset: float, way: ReferencePath, near: int, traffic: Traffic) -> float:
     """Return how far left of its way car n drives past the bodies left of it, 0 or less, metres; 0 while it passes.
 
-    `offset` (m) is where it would drive otherwise; `near` (count) cars are listed.
+    `offset` (m) is where it would drive otherwise; `near` (count) cars are listed. Only beside a bend it leans.
     """
     drivers = traffic.drivers
     free = near == 0 or offset != 0.0 or drivers.car[b, n].aside != 0.0
-    return 0.0 if free or not leans(drivers.vehicle[b]) else away_from(b, way, near, traffic)
+    free = free or not leans(drivers.vehicle[b]) or not beside_bend(b, n, traffic)
+    return 0.0 if free else away_from(b, way, near, traffic)
+
+
+@jit_rare
+def beside_bend(b: int, n: int, traffic: Traffic) -> bool:
+    """Tell whether car n is in a bend, or between two: a car that turns aside near a crossing may enter it anew."""
+    labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
+    first = int(roads.vert_off[drivers.net[b]])
+    least = drivers.vehicle[b].degree
+    disc = int(labels.crosses[b, n])
+    if disc >= 0:
+        return int(roads.degree[first + disc]) < least
+    lane = int(labels.lane[b, n])
+    if lane < 0:
+        return False
+    begin, end = lane_start(roads, drivers.net[b], lane), lane_end(roads, drivers.net[b], lane)
+    return int(roads.degree[first + begin]) < least and int(roads.degree[first + end]) < least
 
 
 @jit_rare
