@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
+
+BARRING = re.compile(r"obstacles\[(\d+)\]")
+"""The field of which it is said that an obstacle bars a goal."""
 
 
 def random_roads(draws: Draws, largest: int, density: float, bent: float = 0.0) -> dict[str, Any]:
@@ -39,7 +44,10 @@ def random_trial(
     number: int,
     **more: Any,
 ) -> Instance:
-    """Return a trial with 1 to 4 goals on a network; `more` are further entries of the configuration."""
+    """Return a trial with 1 to 4 goals on a network; `more` are further entries of the configuration.
+
+    Obstacles among them that would leave a goal without an exit are left out.
+    """
     configuration = {
         "version": 1,
         "problem_domain": "dubins_traffic",
@@ -50,4 +58,13 @@ def random_trial(
         "number_goals_bounds": [1, 4],
         **more,
     }
-    return draw(load_config(configuration), seed, number)
+    while True:
+        try:
+            return draw(load_config(configuration), seed, number)
+        except InputError as error:
+            barring = BARRING.fullmatch(error.field or "")
+            if barring is None:
+                raise
+            obstacles = list(configuration["obstacles"])
+            del obstacles[int(barring[1])]
+            configuration["obstacles"] = obstacles

@@ -14,7 +14,6 @@ the ego is not clean does not count.
 from __future__ import annotations
 
 import math
-import re
 import sys
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
@@ -26,14 +25,11 @@ from benchmarks.drawing import random_roads, random_trial
 from benchmarks.odd_drivers import KINDS
 from benchmarks.rules import e_agents
 from benchmarks.table import Row, show
-from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import run_trial
 
-BARRING = re.compile(r"obstacles\[(\d+)\]")
-"""The field of a refusal of an obstacle that bars a goal or the way to it; it is left out."""
 DURATION = 120.0
 SEED = 2016
 TRIALS = 2000
@@ -71,19 +67,12 @@ def instance(number: int, seconds: float = DURATION) -> Instance:
     agents = e_agents("nemesis" if nemesis else "lawful", draws.between(1, 7), draws)
     if team:
         agents = [{"type": "counter", "name": f"car{k}"} for k in range(2)]
-    obstacles: list[dict[str, Any]] = []
+    more: dict[str, Any] = {}
     if blocked and not team:
-        bare = random_trial(network, agents, seconds, SEED, number, rules=True)
-        obstacles = _obstacles(bare, draws)
-    while True:
-        try:
-            more = {"obstacles": obstacles} if blocked and not team else {}
-            return random_trial(network, agents, seconds, SEED, number, rules=True, **more)
-        except InputError as error:
-            barring = BARRING.fullmatch(error.field or "")
-            if barring is None:
-                raise
-            del obstacles[int(barring[1])]
+        more["obstacles"] = _obstacles(
+            random_trial(network, agents, seconds, SEED, number, rules=True), draws
+        )
+    return random_trial(network, agents, seconds, SEED, number, rules=True, **more)
 
 
 def _grid(draws: Draws, small: bool) -> dict[str, Any]:
