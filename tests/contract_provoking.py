@@ -74,6 +74,17 @@ def ego_closes(number: int) -> Made:
     return _provoked(stage, lane, stage.pose(out, far), drivers.AsEgo(drivers.Swings(), **own))
 
 
+def ego_closes_crossing(number: int) -> Made:
+    """The ego closes an exit of a crossing by backing, and opens it again, many cars about."""
+    stage = Stage(number, TEE)
+    lane = stage.lane_into(3)
+    own = {"back": stage.dice.uniform(0.05, 0.29), "period": stage.dice.uniform(2.0, 20.0)}
+    far = RADIUS + own["back"] + stage.dice.uniform(0.3, 1.1)
+    return _provoked(
+        stage, lane, stage.pose(stage.exit_of(lane), far), drivers.AsEgo(drivers.Swings(), **own), 6
+    )
+
+
 def ego_tilted(number: int) -> Made:
     """The ego stands tilted at the centre line beside a bend."""
     stage, lane, out = _bend_stage(number)
@@ -163,7 +174,7 @@ def ego_whims(number: int) -> Made:
 PROVOKING: Final[Mapping[str, Scene]] = {
     own.__name__: own
     for own in (
-        ego_beyond_exit, ego_beyond_crossing, ego_closes, ego_tilted, ego_slow, ego_swings, ego_at_edge,
-        ego_in_bend, ego_by_obstacle, ego_holds, ego_whims,
+        ego_beyond_exit, ego_beyond_crossing, ego_closes, ego_closes_crossing, ego_tilted, ego_slow, ego_swings,
+        ego_at_edge, ego_in_bend, ego_by_obstacle, ego_holds, ego_whims,
     )
 }  # fmt: skip

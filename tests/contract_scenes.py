@@ -48,7 +48,8 @@ class _Times(Visiting):
 def bound_of(problem: Problem, rules: RuleParameters) -> float:
     """Return how long the ego may be kept waiting by cars that break nothing, seconds: see `test_contract`."""
     longest = float(problem.network.lengths.max()) / problem.car.bounds.speed
-    return (1 + len(problem.e_agents)) * (rules.rest_time + rules.journey_lengths * longest) + rules.goal_time
+    journey = 2.0 * rules.rest_time + rules.journey_lengths * longest
+    return (1 + len(problem.e_agents)) * journey + rules.goal_time
 
 
 def trial(name: str, number: int, seconds: float | None = None) -> Came:

@@ -72,18 +72,20 @@ class Judge:
     def journeys_of(self, n: int) -> Found:
         """E5: the breaches of a car, at most one a journey; also note the frames in which it is overdue."""
         found: Found = set()
-        rules, last, begun, spent, over = self.rules, -1, 0, 0, False
+        rules, last, begun, spent, excused, over = self.rules, -1, 0, 0, 0, False
         way = rules.journey_lengths * max(map(self.reference.length, range(len(self.reference.ends))))
         limit = self.ticks(rules.rest_time + way / self.problem.car.bounds.speed)
         for k in range(len(self.past)):
             facts = self.past[k][n]
             v = facts["crosses"]
             if v not in (-1, last):
-                last, begun, spent, over = v, k, 0, False
+                last, begun, spent, excused, over = v, k, 0, 0, False
             elif k > begun:
-                spent += (
-                    k - begun <= self.ticks(rules.journey_start_time) or facts["way" if v < 0 else "exit"]
-                )
+                starts = k - begun <= min(self.ticks(rules.journey_start_time), limit)
+                excused += v < 0 and not starts and facts["way"] == "for a while"
+                lasts = v < 0 and facts["way"] == "for a while" and excused > self.ticks(rules.rest_time)
+                self.fired["E5 excused for long"] += lasts
+                spent += starts or (facts["way"] == "free" or lasts if v < 0 else facts["exit"])
             if spent >= limit and not over:
                 over = True
                 found.add(("E5", n, k, begun))
@@ -106,6 +108,15 @@ class Judge:
     def exits(self, v: int, came: int) -> list[tuple[int, int]]:
         """The lanes out of v for a car that came by the lane `came`: at a bend not the way back."""
         return [arm for arm in self.arms(v) if not (self.bend(v) and came >= 0 and arm[0] == came // 2)]
+
+    def exits_of(self, k: int, n: int, v: int) -> list[tuple[int, int]]:
+        """The lanes out of v for a car whose body meets its disc: one that its centre is on already, or all exits."""
+        return [self.gone(k, n, v)] if self.gone(k, n, v) else self.exits(v, self.came_by(k, n))
+
+    def gone(self, k: int, n: int, v: int) -> tuple[int, int] | None:
+        """The lane out of v on which the centre of a car is, outside the disc, if it is on one."""
+        lane = divmod(self.past[k][n]["lane"], 2)
+        return lane if self.past[k][n]["lane"] >= 0 and lane in self.arms(v) else None
 
     def bend(self, v: int) -> bool:
         return len(self.arms(v)) >= 2 and not self.reference.crossing(v)
@@ -169,8 +180,10 @@ class Judge:
         if v < 0:
             return False
         came = self.came_by(k, n)
-        found = any(self.free(k, n, v, arm, came) for arm in self.exits(v, came))
-        if not found and any(self.free(k, n, v, arm, came) for arm in self.arms(v)):
+        found = any(self.free(k, n, v, arm, came) for arm in self.exits_of(k, n, v))
+        if self.gone(k, n, v):
+            self.fired["gone out"] += not found
+        elif not found and any(self.free(k, n, v, arm, came) for arm in self.arms(v)):
             self.fired["way back"] += 1
         return found
 
@@ -180,32 +193,37 @@ class Judge:
         if v < 0 or self.past[k][0]["crosses"] != v:
             return False
         ego, own = self.since(k, 0), self.since(k, n)
+        if any(self.gone(m, n, v) for m in range(own, k + 1)):
+            self.fired["out before the ego"] += ego >= own
+            return False
         if ego == own:
             self.fired["same tick"] += 1
             return k - own <= self.ticks(self.rules.shared_time)
         return ego > own
 
-    def way(self, k: int, n: int) -> bool:
-        """E5: whether a car is in a lane with a free way ahead."""
-        facts = self.past[k][n]
+    def way(self, k: int, n: int) -> str:
+        """E5: whether the way of a car is "free", or it is excused "for a while", or while it is so (empty)."""
+        facts, ego = self.past[k][n], self.past[k][0]
         if facts["lane"] < 0 or (facts["stopped"] and not (facts["first"] and facts["clear"])):
-            return False
-        lane = divmod(facts["lane"], 2)
+            return ""
+        lane, found = divmod(facts["lane"], 2), "free"
         if facts["left"]:
             hems = 2.0 * self.problem.car.body.reach + self.rules.overtaking_behind
-            if n != 0 and math.dist(facts["spot"], self.past[k][0]["spot"]) <= hems:
+            if n != 0 and math.dist(facts["spot"], ego["spot"]) <= hems:
                 self.fired["left by the ego"] += 1
-                return False
-        elif self.narrow_ahead(k, n, lane):
-            return False
+                found = "for a while" if ego["lane"] == facts["lane"] and not ego["left"] else ""
+                self.fired["left before the ego"] += bool(found)
+        elif self.narrow_ahead(k, n, lane) or self.lacks_room(k, n, lane):
+            found = ""
         v = self.reference.toward(lane)
         begins = self.reference.length(lane[0]) - self.problem.intersection_radius
         if self.reference.crossing(v) or begins - facts["progress"] > self.rules.way_distance:
-            return True
-        return self.may_enter(k, n, v, facts["lane"])
+            return found
+        enters = self.may_enter(k, n, v, facts["lane"])
+        return min(found, enters, key=("", "for a while", "free").index)
 
     def narrow_ahead(self, k: int, n: int, lane: tuple[int, int]) -> bool:
-        """E5: whether a body or an obstacle narrows the lane of a car before it."""
+        """E5: whether a body narrows the lane of a car before it."""
         here, reach = self.past[k][n]["progress"], self.rules.way_distance
         for other in self.cars:
             its = self.past[k][other]
@@ -214,26 +232,55 @@ class Judge:
             ahead = self.reference.coordinates(lane, *its["spot"])[0] - here
             if 0 < ahead <= reach and self.reference.narrows(*its["sides"][lane]):
                 return True
-        for obstacle in self.problem.obstacles:
-            side = self.reference.obstacle_range(lane, obstacle, here, here + reach)
-            if side is not None and self.reference.narrows(*side):
-                return True
         return False
 
-    def may_enter(self, k: int, n: int, v: int, lane: int) -> bool:
-        """E5: whether an exit of a bend or dead end is free, and neither the ego nor one of the same lane is in it."""
+    def shut(self, lane: tuple[int, int], begin: float, end: float) -> bool:
+        """Whether an obstacle narrows a lane between two places."""
+        sides = [self.reference.obstacle_range(lane, one, begin, end) for one in self.problem.obstacles]
+        return any(side is not None and self.reference.narrows(*side) for side in sides)
+
+    def lacks_room(self, k: int, n: int, lane: tuple[int, int]) -> bool:
+        """E5: whether an obstacle narrows the lane of a car before it, and the car may not be able to pass it now."""
+        facts, reach = self.past[k][n], self.rules.way_distance
+        here, length = facts["progress"], self.reference.length(lane[0])
+        if not self.shut(lane, here, here + reach):
+            return False
+        hems = 2.0 * self.problem.car.body.reach + self.rules.overtaking_behind
+        returns = length - self.problem.intersection_radius - hems
+        if self.shut(lane, max(here, returns), here + reach):
+            self.fired["obstacle by the disc"] += 1
+            return True
+        if self.shut((lane[0], 1 - lane[1]), length - here - 2.0 * reach, length - here):
+            self.fired["obstacles on both sides"] += 1
+            return True
+        for other in self.cars:
+            its = self.past[k][other]
+            behind = its["lane"] == facts["lane"] and its["progress"] < here and not its["left"]
+            there = its["segment"] == lane[0] and not behind
+            if other != n and (there or its["crosses"] == facts["toward"]):
+                self.fired["not alone at an obstacle"] += 1
+                return True
+        self.fired["alone at an obstacle"] += 1
+        return False
+
+    def may_enter(self, k: int, n: int, v: int, lane: int) -> str:
+        """E5: whether an exit of a bend or dead end is "free", and neither the ego nor one of the same lane is in it.
+
+        If only no exit is free, and it is no goal, the car is excused "for a while".
+        """
         for other in self.cars:
             if other == n or self.past[k][other]["crosses"] != v:
                 continue
             if other == 0:
                 self.fired["ego in the bend"] += 1
-                return False
+                return ""
             if self.came_by(k, other) == lane:
                 self.fired["one in the bend"] += 1
-                return False
+                return ""
         found = any(self.free(k, n, v, arm, lane) for arm in self.exits(v, lane))
         self.fired["full bend"] += not found
-        return found
+        goal = self.reference.points[v] in [self.reference.points[g] for g in self.problem.goal_vertices]
+        return "free" if found else "" if goal or len(self.arms(v)) > 2 else "for a while"
 
     def held(self, k: int, v: int) -> bool:
         """E6: whether the tick that ends in frame k does not count for the goal v."""
@@ -241,10 +288,10 @@ class Judge:
         ego = self.past[k][0]["spot"]
         for n in there:
             came = self.came_by(k, n)
-            if any(self.free(k, n, v, arm, came) for arm in self.exits(v, came)):
+            if any(self.free(k, n, v, arm, came) for arm in self.exits_of(k, n, v)):
                 return False
         for n in there:
-            for arm in self.exits(v, self.came_by(k, n)):
+            for arm in self.exits_of(k, n, v):
                 if self.mouth(arm, ego) <= self.rules.goal_gap:
                     return True
         waiting = {0}
@@ -266,7 +313,7 @@ class Judge:
                 if ahead or arrives or (facts["blocked"] and its["segment"] == lane // 2):
                     return True
             if v >= 0 and not facts["leaves"]:
-                exits = self.exits(v, self.came_by(k, n))
+                exits = self.exits_of(k, n, v)
                 if its["crosses"] == v or any(self.fills(k, n, other, v, arm) for arm in exits):
                     return True
         return False

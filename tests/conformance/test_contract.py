@@ -2,8 +2,8 @@
 
 The e-agents of `tests.contract_scenes.BLOCKING` stand in the way of the ego `rules`. Until one of them has broken a
 rule, the ego may not be without a visit for longer than a bound: all of them together may take the longest journey each
-(E5) and the longest stay in a goal (E6), and so may whoever waits for them. The egos of `PROVOKING` are among `lawful`
-cars, and as long as they have broken nothing, these break nothing.
+(E5, with what excuses for a while) and the longest stay in a goal (E6), and so may whoever waits for them. The egos of
+`PROVOKING` are among `lawful` cars, and as long as they have broken nothing, these break nothing.
 
 ``DUBINS_TRAFFIC_CONTRACT=full`` runs 2,000 trials of 300 s.
 """
@@ -22,14 +22,17 @@ from tests.contract_scenes import SCENES, Came, trial
 
 FULL = os.environ.get("DUBINS_TRAFFIC_CONTRACT") == "full"
 NUMBERS = tuple(range(2000 // len(SCENES) + 1)) if FULL else tuple(range(4))
-FELL = {"disc_edge_out": (7, 8), "before_obstacle": (9,), "head_on": (7, 12, 13), "ego_tilted": (10, 14, 16)}
+FELL = {
+    "disc_edge_out": (7, 8),
+    "before_obstacle": (9,),
+    "head_on": (7, 12, 13),
+    "ring": (5,),
+    "ego_tilted": (10, 14, 16),
+}
 """Trials beyond the first ones in which the bar once did not hold."""
 SECONDS = 300.0 if FULL else None
 BLOCKS = {
-    "disc_edge_out": "a car over the edge of a bend's disc owes nothing while the ego waits in the disc behind it",
-    "head_on": "a car on the left owes nothing while the ego stands behind it",
-    "before_obstacle": "a car before an obstacle owes nothing, and the ego may lack the room to pass both",
-    "ring": "cars that wait for one another round a ring owe nothing",
+    "before_obstacle": "an obstacle near to the end of a lane excuses who may lack the room to come back behind it",
 }
 """Scenes in which e-agents that break nothing still block the ego."""
 

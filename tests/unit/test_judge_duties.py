@@ -12,6 +12,7 @@ from dubins_traffic.roads.network import RoadNetwork
 from tests.judging import (
     EASED,
     EPS,
+    GRID,
     RHO,
     ROADS,
     after,
@@ -179,7 +180,11 @@ def test_e4_who_comes_toward_the_disc_takes_an_exit_only_by_narrowing_it(roads: 
 def test_e4_seconds_do_not_count_in_which_the_ego_has_come_into_the_disc(roads: RoadNetwork) -> None:
     """The ego, that came later, is there from frame 20 to 40, or later again, or from the same frame on."""
     out, enters = lanes_out(roads)[1], lanes_in(roads)[0]
-    inside, away_, there = after(roads, out, -EPS), before(roads, enters, 0.3), before(roads, enters, -0.3)
+    inside, away_, there = (
+        on_lane(roads, out, 0.6, -0.3),
+        before(roads, enters, 0.3),
+        before(roads, enters, -0.3),
+    )
 
     def found(ego: range, agent: int = 0, **rules: float) -> list[tuple[object, ...]]:
         waits = before(roads, lanes_in(roads)[1], 0.8)
@@ -194,6 +199,42 @@ def test_e4_seconds_do_not_count_in_which_the_ego_has_come_into_the_disc(roads: 
     assert found(range(20, 120), agent=20) == []
     assert found(range(20, 120), agent=20, shared_time=3.0) == [("E4", 1, 100, 20)]
     assert found(range(20, 30), agent=20) == [("E4", 1, 79, 20)]
+
+
+@both
+def test_e4_seconds_count_once_the_centre_has_been_out_of_the_disc(roads: RoadNetwork) -> None:
+    """The ego comes at frame 20; the agent's centre is out of the disc never, from the start, or in one frame."""
+    out, enters = lanes_out(roads)[1], lanes_in(roads)[0]
+    far, there = before(roads, enters, 0.3), before(roads, enters, -0.3)
+    inside, beyond, coming = (
+        on_lane(roads, out, 0.6, -0.3),
+        after(roads, out, -EPS),
+        before(roads, out ^ 1, -EPS),
+    )
+
+    def found(agent: dict[int, tuple[float, ...]]) -> list[tuple[object, ...]]:
+        script = [[there if k >= 20 else far, agent.get(k, inside)] for k in range(80)]
+        return [entry for entry in said(judged(case(roads, 2), script)) if entry[0] == "E4"]
+
+    assert found({}) == []
+    assert found(dict.fromkeys(range(80), beyond)) == [("E4", 1, 50, 0)]
+    assert found({40: beyond}) == [("E4", 1, 70, 0)]
+    assert found({0: coming}) == []
+
+
+@both
+def test_e4_who_is_out_on_a_lane_has_no_other_exit(roads: RoadNetwork) -> None:
+    """The agent's centre is beyond the disc; somebody stands before it on its lane, and all other exits are free."""
+    out = lanes_out(roads)[1]
+
+    def found(ahead: float, centre: float) -> list[tuple[object, ...]]:
+        script = hold(after(roads, out, ahead), on_lane(roads, out, centre, -0.3), frames=60)
+        return [entry for entry in said(judged(case(roads, 2), script)) if entry[0] == "E4"]
+
+    beyond = math.sqrt(1.0 - 0.09)
+    assert found(0.4, beyond + EPS) == []
+    assert found(0.7, beyond + EPS) == [("E4", 1, 50, 0)]
+    assert found(0.4, beyond - EPS) == [("E4", 1, 50, 0)]
 
 
 @both
@@ -338,21 +379,81 @@ def test_e5_of_two_that_meet_time_counts_for_who_is_on_the_left(roads: RoadNetwo
 
 
 @both
+def test_e5_the_ego_behind_who_is_left_excuses_for_a_while(roads: RoadNetwork) -> None:
+    """The ego is beside agent 1, in the same lane state or in the other one, or left as well."""
+    lane = lanes_in(roads)[0]
+    length = float(roads.lengths[lane // 2])
+    over, meets = on_lane(roads, lane, 1.6, 0.25), on_lane(roads, lane ^ 1, length - 2.6, -0.3)
+
+    def found(ego: tuple[float, ...], frames: int) -> list[tuple[object, ...]]:
+        script = [[ego, over, meets] for _ in range(frames)]
+        return [entry for entry in said(judged(case(roads, 3, **SOON), script)) if entry[:2] == ("E5", 1)]
+
+    behind, comes = on_lane(roads, lane, 1.2, -0.3), on_lane(roads, lane ^ 1, length - 1.2, 0.3)
+    assert found(behind, 60) == []
+    assert found(behind, 61) == [("E5", 1, 60, 0)]
+    assert found(comes, 99) == []
+    assert found(on_lane(roads, lane, 1.2, -0.1), 99) == []
+
+
+def test_e5_an_obstacle_excuses_who_may_lack_room_to_pass_it() -> None:
+    """An obstacle is 0.8 m ahead of the agent; others are on the road, in the disc ahead, or behind."""
+    roads = GRID
+    lane = lanes_in(roads)[0]
+    length = float(roads.lengths[lane // 2])
+    waits = on_lane(roads, lane, 1.6, -0.3)
+
+    def found(
+        ego: tuple[float, ...], *more: tuple[float, float], far: float = 2.4, **rules: float
+    ) -> list[tuple[object, ...]]:
+        trial = case(roads, 2, **{**SOON, **rules})
+        places = [on_lane(roads, lane, *place)[:2] for place in ((far, -0.3), *more)]
+        obstacles = tuple(DiscObstacle(x, y, 0.1) for x, y in places)
+        problem = replace(trial.problem, obstacles=obstacles)
+        return said(judged(replace(trial, problem=problem), hold(ego, waits, frames=31)))
+
+    elsewhere = on_lane(roads, lanes_in(roads)[1], 1.6, -0.3)
+    late = [("E5", 1, 30, 0)]
+    assert found(elsewhere) == late
+    assert found(on_lane(roads, lane, 1.2, -0.3)) == late
+    assert found(on_lane(roads, lane, 1.4, 0.3)) == []
+    assert found(on_lane(roads, lane, 2.6, -0.3)) == []
+    assert found(on_lane(roads, lane ^ 1, length - 0.9, -0.3)) == []
+    assert found(on_lane(roads, lane, length - 0.5, -0.3)) == []
+    assert found(elsewhere, (4.0, 0.3)) == []
+    assert found(elsewhere, (4.75, 0.3)) == late
+    by_the_disc = length - 1.0 - 2.0 * RHO - 0.8
+    narrow = {"way_distance": length, "blocked_ahead": 1.5}
+    assert found(elsewhere, far=by_the_disc - 0.1 - EPS, **narrow) == late
+    assert found(elsewhere, far=by_the_disc - 0.1 + EPS, **narrow) == []
+
+
+@both
 def test_e5_a_bend_is_no_free_way_that_is_full_or_has_the_ego_in_it(roads: RoadNetwork) -> None:
     v = next(v for v, degree in enumerate(roads.degrees) if degree == 2)
     one, two = roads.arms(v)
     waits = before(roads, one ^ 1, 0.4)
     rules = {**SOON, "rest_time": 1.0, "exit_time": 99.0}
 
-    def found(ego: tuple[float, ...], other: tuple[float, ...], **more: float) -> list[tuple[object, ...]]:
-        script = hold(ego, waits, other, frames=22)
-        found = said(judged(case(roads, 3, **{**rules, **more}), script))
+    def found(
+        ego: tuple[float, ...],
+        other: tuple[float, ...],
+        *,
+        frames: int = 20,
+        goal: bool = False,
+        **more: float,
+    ) -> list[tuple[object, ...]]:
+        goals = [roads.intersections[v]] if goal else []
+        script = hold(ego, waits, other, frames=frames)
+        found = said(judged(case(roads, 3, goals, **{**rules, **more}), script))
         return [entry for entry in found if entry[:2] == ("E5", 1)]
 
     late = [("E5", 1, 10, 0)]
     far, beyond = away(roads), after(roads, two, 1.0)
     assert found(far, beyond) == late
     assert found(far, after(roads, two, 0.3)) == []
+    assert found(far, after(roads, two, 0.3), frames=22) == [("E5", 1, 20, 0)]
+    assert found(far, after(roads, two, 0.3), frames=22, goal=True) == []
     assert found(far, after(roads, two, 0.3, 0.3)) == late
     assert found(after(roads, two, -EPS), beyond) == []
     assert found(after(roads, two, -EPS), beyond, way_distance=0.3, blocked_ahead=0.3) == late
@@ -372,7 +473,7 @@ def test_e5_who_comes_the_other_way_through_a_bend_closes_no_exit(roads: RoadNet
     rules = {**SOON, "rest_time": 1.0, "exit_time": 99.0}
 
     def found(start: tuple[float, ...]) -> list[tuple[object, ...]]:
-        script = [[away(roads), waits, start if k == 0 else at_two] for k in range(22)]
+        script = [[away(roads), waits, start if k == 0 else at_two] for k in range(20)]
         return [entry for entry in said(judged(case(roads, 3, **rules), script)) if entry[:2] == ("E5", 1)]
 
     assert found(by_two) == [("E5", 1, 10, 0)]

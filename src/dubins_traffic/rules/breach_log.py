@@ -88,6 +88,8 @@ class RefereeParameters:
     """So many ticks count at the start of each journey."""
     goal_ticks: int
     shared_ticks: int
+    excused_ticks: int
+    """E5's most ticks of a journey for which a car ahead of a full bend, or left before the ego, owes nothing."""
     most_tickets: int
     """E3's most new tickets in one wait."""
     goals_begin: int
@@ -134,6 +136,8 @@ class JudgedCar:
     """Tick in which the present journey began (E5)."""
     journey_spent: int = 0
     """Number of ticks of it that count, those at its start apart."""
+    journey_excused: int = 0
+    """Number of ticks of it in which the ego behind it, or a full bend, was its only excuse."""
     journey_over: int = 0
     """Whether E5 has been broken in this journey."""
     last_disc: int = -1
@@ -146,6 +150,8 @@ class JudgedCar:
     """Whether the car waits for the ego, 0 or 1, in the frame in which a goal was last asked for it."""
     came_by: int = -1
     """The lane by which the car came into the disc that its body meets, -1 if it started there."""
+    been_out: int = 0
+    """Whether, in this stay, its centre has been outside that disc on a lane out of it."""
     ticket: int = -1
     """Tick of the car's ticket, as of the frame before."""
     approach_since: int = -1
@@ -298,5 +304,6 @@ def pack_terms(
         own.start_ticks = ticks(given.journey_start_time, rate)
         own.goal_ticks = ticks(given.goal_time, rate)
         own.shared_ticks = ticks(given.shared_time, rate)
+        own.excused_ticks = ticks(given.rest_time, rate)
         own.most_tickets = given.tickets
     return terms

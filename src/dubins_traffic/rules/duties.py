@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from math import sqrt
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -13,10 +14,22 @@ from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.rules.blocking import RightLane, lane_of, narrows, obstacle_narrows, place_in_lane
 from dubins_traffic.rules.breach_log import NEVER_DUE, RULE, RefereeTables
 from dubins_traffic.rules.breaches import FIRST_AND_CLEAR, add, at_goal, judge_queue, lasted, run, when_due
-from dubins_traffic.rules.exits import ego_at_exit, find_exit, look_for_exit, way_back
+from dubins_traffic.rules.exits import ego_at_exit, find_exit, lane_taken, look_for_exit, way_back
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN
 from dubins_traffic.rules.waiting import find_waiting
+
+
+class _Excuse(NamedTuple):
+    """What excuses a car in a lane that does not come on."""
+
+    NONE: int = 0
+    FOR_A_WHILE: int = 1
+    """The ego behind it in its lane while it is left, or a bend without a free exit; so long at most in a journey."""
+    YES: int = 2
+
+
+EXCUSE: Final = _Excuse()
 
 
 @jit_inline
@@ -41,7 +54,7 @@ def judge_agent(b: int, n: int, tick: int, tables: RefereeTables) -> int:
         due = min(due, _judge_exit(b, n, tick, v, tables))
         if v != car.last_disc:
             car.last_disc, car.journey_since = v, tick
-            car.journey_spent = car.journey_over = 0
+            car.journey_spent = car.journey_excused = car.journey_over = 0
     return min(due, _judge_journey(b, n, tick, tables))
 
 
@@ -58,7 +71,11 @@ def _judge_journey(b: int, n: int, tick: int, tables: RefereeTables) -> int:
     if long < start:
         return car.journey_since + start
     if long > start:
-        counts = has_way(b, n, tick, tables) if labels.crosses[b, n] < 0 else car.exit_counts >= 0
+        excuse = excuse_of(b, n, tick, tables) if labels.crosses[b, n] < 0 else EXCUSE.NONE
+        counts = excuse == EXCUSE.NONE and (labels.crosses[b, n] < 0 or car.exit_counts >= 0)
+        if excuse == EXCUSE.FOR_A_WHILE:
+            car.journey_excused += 1
+            counts = car.journey_excused > terms.excused_ticks
         car.journey_spent += 1 if counts else 0
     if car.journey_over == 0 and start + car.journey_spent == terms.journey_ticks:
         car.journey_over = 1
@@ -71,7 +88,8 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
     """Judge E4 for e-agent n of trial b, whose body meets the disc of v.
 
     Ticks do not count while the ego, too, is in the disc and came there later, or, up to `shared_time`, in the same
-    tick. Returns the tick in which to judge again if the car's labels stay the same.
+    tick, unless the car's centre has been out of it. Returns the tick in which to judge again if the car's labels stay
+    the same.
 
     Norm: docs/rules.md#E4, docs/rules.md#pause.
     """
@@ -79,8 +97,10 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
     car, ego = log.car[b, n], log.car[b, EGO]
     back = way_back(v, car.came_by, tables.roads, tables.rules[b])
     free, again = look_for_exit(b, n, tick, v, back, tables)
+    if tables.labels.at[b, n] != v and lane_taken(b, n, v, tables) >= 0:
+        car.been_out = 1
     paused = False
-    if tables.labels.crosses[b, EGO] == v:
+    if tables.labels.crosses[b, EGO] == v and car.been_out == 0:
         shares = ego.in_since == car.in_since
         lately = tick - car.in_since <= terms.shared_ticks
         paused = ego.in_since > car.in_since or (shares and lately)
@@ -103,34 +123,49 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
 
 
 @jit_rare
-def has_way(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
-    """Tell whether car n of trial b is in a lane with a free way ahead (E5).
+def excuse_of(b: int, n: int, tick: int, tables: RefereeTables) -> int:
+    """Return whether car n of trial b, in a lane, has an `EXCUSE` for not coming on: its way ahead is not free (E5).
 
     Norm: docs/rules.md#way.
     """
-    state, roads, labels, row = tables.state, tables.roads, tables.labels, tables.memory.car[b]
+    roads, labels, row = tables.roads, tables.labels, tables.memory.car[b]
     own, terms = tables.rules[b], tables.terms[b]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
     if lane < 0 or (bits & FLAG.STOPPED != 0 and bits & FIRST_AND_CLEAR != FIRST_AND_CLEAR):
-        return False
+        return EXCUSE.YES
     here = row[n].progress
     place = lane_of(roads, own, b, lane)
+    excuse = EXCUSE.NONE
+    v = lane_end(roads, own.net, lane)
     if bits & FLAG.LEFT != 0:
         if _is_by_ego(b, n, tables):
-            return False
-    elif _is_narrow(b, n, place, here, tables):
-        return False
-    v = lane_end(roads, own.net, lane)
+            beside = labels.lane[b, EGO] == lane and np.int64(labels.bits[b, EGO]) & FLAG.LEFT == 0
+            excuse = EXCUSE.FOR_A_WHILE if beside else EXCUSE.YES
+    elif _is_narrow(b, n, place, here, tables) or _lacks_room(b, n, place, here, v, tables):
+        excuse = EXCUSE.YES
     vertex = int(roads.vert_off[own.net]) + v
-    if roads.degree[vertex] >= own.crossing_degree or place.length - own.radius - here > terms.way:
-        return True
-    for k in range(state.count[b]):
+    degree = roads.degree[vertex]
+    if excuse == EXCUSE.YES or degree >= own.crossing_degree or place.length - own.radius - here > terms.way:
+        return excuse
+    for k in range(tables.state.count[b]):
         if k != n and labels.crosses[b, k] == v and (k == EGO or tables.log.car[b, k].came_by == lane):
-            return False
+            return EXCUSE.YES
     vx, vy = roads.vertex[vertex].x, roads.vertex[vertex].y
-    count = list_near(state, b, tick, vx, vy, terms.lone, tables.spacing)
-    return find_exit(b, n, v, way_back(v, lane, roads, own), count, tables)
+    count = list_near(tables.state, b, tick, vx, vy, terms.lone, tables.spacing)
+    if find_exit(b, n, v, way_back(v, lane, roads, own), count, tables):
+        return excuse
+    return EXCUSE.FOR_A_WHILE if degree <= 2 and not _is_goal(b, v, tables) else EXCUSE.YES
+
+
+@jit_inline
+def _is_goal(b: int, v: int, tables: RefereeTables) -> bool:
+    """Tell whether the intersection v is a goal of trial b."""
+    terms = tables.terms[b]
+    found = False
+    for g in range(terms.goals_begin, terms.goals_end):
+        found |= tables.log.goal[g].vertex == v
+    return found
 
 
 @jit_inline
@@ -151,7 +186,36 @@ def _is_narrow(b: int, n: int, place: RightLane, here: float, tables: RefereeTab
             near = 0.0 < progress - here <= way
             if near and narrows(low, high, own.lane_width, own.free_needed + GRAIN):
                 return True
-    return obstacle_narrows(tables.obstacles, place, here, here + way, own.free_needed + GRAIN)
+    return False
+
+
+@jit_inline
+def _lacks_room(b: int, n: int, place: RightLane, here: float, v: int, tables: RefereeTables) -> bool:
+    """Tell whether an obstacle narrows the lane ahead of car n, and it may lack the room to pass that now.
+
+    It lacks it if obstacles narrow the left lane, too, or the right one up to the disc of v at its end; or if another
+    car is on the road, but behind in the same lane, or in that disc.
+
+    Norm: docs/rules.md#lacks-room.
+    """
+    obstacles, own, way, labels = tables.obstacles, tables.rules[b], tables.terms[b].way, tables.labels
+    needed = own.free_needed + GRAIN
+    if not obstacle_narrows(obstacles, place, here, here + way, needed):
+        return False
+    returns = place.length - own.radius - sqrt(own.hem2)
+    if obstacle_narrows(obstacles, place, max(here, returns), here + way, needed):
+        return True
+    left, there = lane_of(tables.roads, own, b, place.lane ^ 1), place.length - here
+    if obstacle_narrows(obstacles, left, there - 2.0 * way, there, needed):
+        return True
+    for k in range(tables.state.count[b]):
+        if k == n:
+            continue
+        behind = labels.lane[b, k] == place.lane and tables.memory.car[b, k].progress < here
+        behind = behind and np.int64(labels.bits[b, k]) & FLAG.LEFT == 0
+        if labels.crosses[b, k] == v or (labels.segment[b, k] == place.lane // 2 and not behind):
+            return True
+    return False
 
 
 @jit
@@ -159,7 +223,9 @@ def find_ways(tick: int, tables: RefereeTables, found: Any) -> None:
     """Write into `found` (B, N) which cars have a free way ahead (E5) in frame `tick`, which has been judged."""
     for b in range(tables.state.count.shape[0]):
         for n in range(tables.state.count[b]):
-            found[b, n] = has_way(b, n, tick, tables)
+            excuse = excuse_of(b, n, tick, tables)
+            spent = tables.log.car[b, n].journey_excused > tables.terms[b].excused_ticks
+            found[b, n] = excuse == EXCUSE.NONE or (excuse == EXCUSE.FOR_A_WHILE and spent)
 
 
 @jit

@@ -7,7 +7,7 @@ from math import sqrt
 from dubins_traffic.cars.near import list_near, ticks_within
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at
+from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
 from dubins_traffic.rules.breach_log import RefereeParameters, RefereeTables
@@ -31,6 +31,29 @@ def way_back(v: int, came: int, t: RoadTable, own: TrialRules) -> int:
     Norm: docs/rules.md#exit.
     """
     return came // 2 if came >= 0 and _is_bend(v, t, own) else -1
+
+
+@jit_inline
+def lane_taken(b: int, n: int, v: int, tables: RefereeTables) -> int:
+    """Return the lane out of v that is car n's lane state while its centre is outside the disc, else -1.
+
+    That lane is then its only exit.
+
+    Norm: docs/rules.md#out.
+    """
+    lane = int(tables.labels.lane[b, n])
+    if lane < 0 or lane_start(tables.roads, tables.rules[b].net, lane) != v:
+        return -1
+    return lane
+
+
+@jit_inline
+def is_exit(lane: int, only: int, back: int) -> bool:
+    """Tell whether a lane out of a disc is an exit for a car that has taken the lane `only`, if that isn't -1.
+
+    Else all are, but that on the segment `back`.
+    """
+    return lane == only if only >= 0 else lane // 2 != back
 
 
 @jit_inline
@@ -81,6 +104,7 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
     """
     t, own, terms = tables.roads, tables.rules[b], tables.terms[b]
     row = int(t.vert_off[own.net]) + v
+    only = lane_taken(b, n, v, tables)
     taken = 0
     for i in range(count):
         k = tables.spacing.near[i]
@@ -88,7 +112,7 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
             taken |= taken_exits(b, n, k, v, back, tables)
     for arm in range(t.degree[row]):
         lane: int = t.arms[row, arm]
-        if taken & (1 << arm) != 0 or lane // 2 == back:
+        if taken & (1 << arm) != 0 or not is_exit(lane, only, back):
             continue
         near, far = own.radius, own.radius + terms.exit_room
         if tables.obstacles.base[b] < 0 or not obstacle_narrows(
@@ -145,6 +169,7 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
     vx, vy = t.vertex[row].x, t.vertex[row].y
     far2, lone = terms.exit2, terms.lone
     near = 0 if back < 0 else 1
+    near += 0 if lane_taken(b, n, v, tables) < 0 else 4
     nearest2 = beyond2 = lone * lone
     count = list_near(state, b, tick, vx, vy, lone, spacing)
     for i in range(count):

@@ -44,6 +44,7 @@ def judge_trial(b: int, tick: int, tables: RefereeTables) -> None:
         if car.crosses != labels.crosses[b, n]:
             car.in_since = tick
             car.came_by = car.lane
+            car.been_out = 0
     for i in range(count):
         _judge_car(b, log.look[i], tick, tables)
     if arrived:

@@ -9,7 +9,7 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.roads.lookup import lane_end, lane_length
 from dubins_traffic.rules.breach_log import RefereeTables
-from dubins_traffic.rules.exits import find_exit, taken_exits, way_back
+from dubins_traffic.rules.exits import find_exit, is_exit, lane_taken, taken_exits, way_back
 from dubins_traffic.rules.propositions import FLAG
 
 
@@ -65,9 +65,10 @@ def _waits_in_disc(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
         return False
     back = way_back(v, tables.log.car[b, n].came_by, roads, own)
     row = int(roads.vert_off[own.net]) + v
+    only = lane_taken(b, n, v, tables)
     exits = 0
     for arm in range(roads.degree[row]):
-        exits |= 1 << arm if roads.arms[row, arm] // 2 != back else 0
+        exits |= 1 << arm if is_exit(int(roads.arms[row, arm]), only, back) else 0
     held = False
     for k in range(tables.state.count[b]):
         if k != n and tables.log.car[b, k].waits != 0 and not held:

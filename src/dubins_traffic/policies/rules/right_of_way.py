@@ -120,11 +120,26 @@ def may_enter_bend(
     else:
         free = has_room(b, n, car.next_lane, inside, traffic)
         if long and inside == 0:
-            free = free or is_free(b, n, car.next_lane, traffic)
+            free = free or is_free(b, n, car.next_lane, traffic) or moves_up(v, degree, car, drivers)
     if long and not free and turns and degree == 2:
         take_way_on(b, n, traffic)
     car.kept_out = 0 if free else car.kept_out + 1
     return free
+
+
+@jit_inline
+def moves_up(v: int, degree: Any, car: Driver, drivers: Drivers) -> bool:
+    """Tell whether a car that has waited for long before v goes in though no exit is free: it is no goal (E5)."""
+    return degree <= 2 and not minds_goal(v, car, drivers)
+
+
+@jit_inline
+def minds_goal(v: int, car: Driver, drivers: Drivers) -> bool:
+    """Tell whether the intersection v is a goal that the car is to leave free again and again (E6)."""
+    found = False
+    for k in range(car.goal_first, car.goal_last):
+        found = found or drivers.stage[k] == v
+    return found
 
 
 @jit_inline
@@ -136,10 +151,7 @@ def is_hushed(tick: int, v: int, car: Driver, vehicle: Vehicle, drivers: Drivers
     half = ticks_of(0.5 * vehicle.goal_time, vehicle)
     if half <= 0 or tick % half < (1.0 - HUSH) * half:
         return False
-    found = False
-    for k in range(car.goal_first, car.goal_last):
-        found = found or drivers.stage[k] == v
-    return found
+    return minds_goal(v, car, drivers)
 
 
 @jit_inline
