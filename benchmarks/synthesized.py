@@ -30,6 +30,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.sink import Frames
 from dubins_traffic.routing.free_flow import free_flow
+from dubins_traffic.routing.rounds import round_time
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
@@ -112,9 +113,8 @@ def drive(number: int, seconds: float = DURATION, strategies: str | None = None)
     verdict = result.score.verdict
     assert verdict is not None
     assert result.ending.end is End.DURATION, result.ending
-    gap, limit = verdict.longest_gap_s, verdict.gap_limit_s
+    gap, free = verdict.longest_gap_s, free_flow(own)
     assert gap is not None
-    assert limit is not None
     return Drive(
         number,
         kind,
@@ -127,8 +127,8 @@ def drive(number: int, seconds: float = DURATION, strategies: str | None = None)
         dict(Counter(kind for _, kind, _ in events.found)),
         tuple(f"{time:.2f} {detail}" for time, kind, detail in events.found if kind == UNKNOWN_MOVE),
         result.score.rounds,
-        free_flow(own).rounds(seconds),
-        MOST_ROUNDS * gap / limit,
+        free.rounds(seconds),
+        gap / round_time(own.problem),
         result.wall.time_to_begin_s or 0.0,
     )
 
