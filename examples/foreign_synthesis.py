@@ -3,7 +3,7 @@
     python examples/foreign_synthesis.py --tulip path/to/the/python/that/has/tulip
 
 TuLiP, with omega and dd, is the tool here. It is run by its own Python, since it wants packages of other versions.
-Prints what it has found, and the score of a minute on the road.
+Prints what it has found, and the score of three minutes on the road.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ SQUARE = {
     "laser": False,
     "e-agents": [{"type": "lawful", "name": "car"}],
     "goals": [[0, 0], [1, 1]],
-    "duration": 60,
+    "duration": 180,
     "rules": True,
 }
 """Four roads round a square; the ego is to go to two opposite corners again and again."""
