@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from dubins_traffic.campaign.report.statistics import Interval, clopper_pearson, distributions, wilson
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.companies import beginner
 from dubins_traffic.falsification.counts import Counts
 from dubins_traffic.falsification.crew import Crew, crew_of, maker
-from dubins_traffic.falsification.intervals import Interval, clopper_pearson, wilson
 from dubins_traffic.falsification.liveness import TARGETS
 from dubins_traffic.falsification.replicas import Replicas, combined
 from dubins_traffic.falsification.sampling import STREAM, prepared
@@ -145,7 +145,10 @@ def estimate(
     ------
     InputError
         If anything of this is wrong.
+    MissingExtraError
+        Without the extra `falsify`, which brings SciPy.
     """
+    distributions("an estimate of a probability", "falsify")
     own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
     if event not in TARGETS:
         expected = f"one of {', '.join(TARGETS)}"

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final
 
-from dubins_traffic.falsification.intervals import Interval, clopper_pearson, korn_graubard, worth
+from dubins_traffic.campaign.report.statistics import Interval, clopper_pearson, korn_graubard, worth
 from dubins_traffic.falsification.splitting import Split
 
 MONTE_CARLO: Final = "monte-carlo"

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.report.plots import figures
-from dubins_traffic.campaign.report.statistics import stats
+from dubins_traffic.campaign.report.statistics import distributions
 from dubins_traffic.campaign.run_campaign import Progress, run_campaign
 from dubins_traffic.suites.results import save_trials
 from dubins_traffic.suites.suite import Suite
@@ -55,7 +55,7 @@ def run_suite(
     """
     rows.arrow()
     figures()
-    stats()
+    distributions()
     campaign = suite.campaign(controllers or suite.controllers, trials)
     ran = run_campaign(campaign, folder, workers=workers, resume=resume, progress=progress)
     return save_trials(suite, campaign, ran.folder)

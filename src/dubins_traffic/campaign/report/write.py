@@ -15,7 +15,7 @@ from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.csv_tables import csv_files
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.plots import figures
-from dubins_traffic.campaign.report.statistics import stats
+from dubins_traffic.campaign.report.statistics import distributions
 from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
@@ -72,7 +72,7 @@ def write_report(
     """
     rows.arrow()
     figures()
-    stats()
+    distributions()
     place = Path(folder)
     known, campaign, parts = _open(place)
     results = table.read(place, campaign, parts)
