@@ -172,7 +172,7 @@ def shrink(
     from dubins_traffic.falsification.pages import write_page
     from dubins_traffic.falsification.shrink import shrink as smaller
     from dubins_traffic.problem.files import DOCUMENTS
-    from dubins_traffic.viewer.replay import PAGES
+    from dubins_traffic.viewer.pages import PAGES
 
     target = output or options.beside(case, ".small.json")
     page = options.beside(target, ".html")

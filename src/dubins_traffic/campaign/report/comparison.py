@@ -72,6 +72,20 @@ class Difference:
     larger: int
     smaller: int
 
+    @property
+    def is_decided(self) -> bool:
+        """Whether the interval of the mean leaves out 0."""
+        ends = self.estimate.mean_interval
+        return ends is not None and (ends[0] > 0 or ends[1] < 0)
+
+    @property
+    def better(self) -> str | None:
+        """The controller that is better in the metric, if the difference is decided."""
+        mean, better = self.estimate.mean, self.metric.better
+        if mean is None or not better or not self.is_decided:
+            return None
+        return self.first if (mean > 0) == (better > 0) else self.second
+
 
 @dataclass(frozen=True, slots=True)
 class Level:

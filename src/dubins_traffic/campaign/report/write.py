@@ -20,7 +20,7 @@ from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, require_output, write_text
-from dubins_traffic.viewer.replay import PAGES
+from dubins_traffic.viewer.pages import PAGES
 
 REPORT = "report"
 PAGE = "index.html"
