@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from dubins_traffic.campaign.report import plots
-from dubins_traffic.campaign.report.comparison import Comparison
-from dubins_traffic.campaign.report.metrics import shown, words
+from dubins_traffic.campaign.report.comparison import Comparison, shown, words
 from dubins_traffic.campaign.report.worst import Bad
 from dubins_traffic.rules.clauses import clause
 from dubins_traffic.scoring.clean import told_cut

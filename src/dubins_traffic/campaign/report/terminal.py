@@ -6,8 +6,7 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from dubins_traffic.campaign.report.comparison import Comparison
-from dubins_traffic.campaign.report.metrics import shown, words
+from dubins_traffic.campaign.report.comparison import Comparison, shown, words
 from dubins_traffic.campaign.report.statistics import Interval, Share
 
 if TYPE_CHECKING:

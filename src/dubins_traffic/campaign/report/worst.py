@@ -13,7 +13,7 @@ import numpy as np
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.report.metrics import words
+from dubins_traffic.campaign.report.comparison import words
 from dubins_traffic.campaign.table import FACTOR, places
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints

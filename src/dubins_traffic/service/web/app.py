@@ -122,7 +122,7 @@ def _middleware(settings: Settings, largest: int) -> list[Any]:
 
 def _templates() -> JinjaTemplateEngine:
     made = environment().overlay(undefined=Undefined)  # forms are shown before and after they are filled in
-    made.filters["moment"] = moment
+    made.filters["moment"] = moment  # pyright: ignore[reportUnknownMemberType]
     return JinjaTemplateEngine.from_environment(made)
 
 
