@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.records import Keep, Records
+from dubins_traffic.campaign.folder import Keep, Records
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch import run_together
 from dubins_traffic.errors import DubinsTrafficError
