@@ -27,12 +27,10 @@ from benchmarks.batch import configuration
 from benchmarks.table import Row
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign.campaign import Campaign
-from dubins_traffic.campaign.engines import Engine
-from dubins_traffic.campaign.pool import Pool
-from dubins_traffic.campaign.ray_engine import RayEngine
 from dubins_traffic.campaign.run_campaign import run_campaign, run_left
-from dubins_traffic.campaign.worker import Surroundings
+from dubins_traffic.runs.crew import Crew
 from dubins_traffic.runs.jobs import Job, run_trials
+from dubins_traffic.runs.ray_crew import crew_at
 
 TRIALS = 20_000
 BARE = 2_000
@@ -85,7 +83,7 @@ def whole(own: Campaign, **engine: Any) -> Whole:
     return Whole(ended - begun, (own.total - done) / (ended - since), table)
 
 
-def at_work(own: Campaign, engine: Engine) -> float:
+def at_work(own: Campaign, engine: Crew) -> float:
     """Return the seconds that a campaign takes on workers that have worked before, the table included."""
     with (
         tempfile.TemporaryDirectory() as place,
@@ -102,8 +100,7 @@ def measure() -> list[Row]:
     own = short()
     whole(own, workers=WORKERS)
     both = [whole(own, workers=WORKERS), whole(own, workers=WORKERS, ray="local")]
-    around = Surroundings.here()
-    with closing(Pool(WORKERS, around)) as pool, closing(RayEngine("local", WORKERS, around)) as ray:
+    with closing(crew_at(None, WORKERS)) as pool, closing(crew_at("local", WORKERS)) as ray:
         for engine in (pool, ray):
             at_work(own, engine)
         rounds = [(at_work(own, pool), at_work(own, ray)) for _ in range(ROUNDS)]

@@ -19,13 +19,12 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.table import Row, show
-from dubins_traffic.competition.boxed import boxed
 from dubins_traffic.competition.competition import Competition, Phase
-from dubins_traffic.competition.frames_hash import FramesHash
-from dubins_traffic.competition.judging import Judged, judge
+from dubins_traffic.competition.judging import FramesHash, Judged, judge
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.competition.templates import write_template
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.sandbox import boxed_controller
 
 COUNT = 1000
 CHUNK = 10
@@ -158,7 +157,12 @@ def processor_s(folder: Path, count: int = MEASURED) -> tuple[float, float]:
     from dubins_traffic.service.worker import replay_of
 
     phase, own = demo(count + 1, folder)
-    seat, record, boxes, began = boxed(own, phase.limits), folder / "trial.mcap", 0.0, 0.0
+    seat, record, boxes, began = (
+        boxed_controller(str(own.path), phase.limits),
+        folder / "trial.mcap",
+        0.0,
+        0.0,
+    )
     for number in phase.numbers:
         instance = phase.instance(number, 16)
         run_trial(instance, seat, record=record, overwrite=True, sinks=(FramesHash(),), sketch=False)

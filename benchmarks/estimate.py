@@ -16,7 +16,7 @@ import numpy as np
 from tests.falsifying import NEAR, corridor, standing
 
 from benchmarks.table import Row, show
-from dubins_traffic.falsification.intervals import clopper_pearson
+from dubins_traffic.campaign.report.statistics import clopper_pearson
 from dubins_traffic.falsification.splitting import Split, split
 from dubins_traffic.problem.draw import draw_many
 

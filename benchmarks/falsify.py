@@ -33,11 +33,11 @@ from tests.mutant_searches import TOWN, first
 from tests.mutants import MUTANTS
 
 from benchmarks.table import Row, show
+from dubins_traffic.campaign.report.statistics import clopper_pearson
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.falsification import search
 from dubins_traffic.falsification.crew import Here
 from dubins_traffic.falsification.found import Found
-from dubins_traffic.falsification.intervals import clopper_pearson
 from dubins_traffic.falsification.search import GENERATION, falsify
 from dubins_traffic.falsification.trying import Tried
 from dubins_traffic.problem.configuration import Configuration, load_config

@@ -21,7 +21,7 @@ import numpy as np
 from tests.services import CIRCLING, STANDING, Person, Service, competition_text, serving
 
 from benchmarks.table import Row, show
-from dubins_traffic.competition.settings import Quota
+from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, queue, submissions
 from dubins_traffic.service.database import Database
 from dubins_traffic.service.submissions import Upload

@@ -62,7 +62,7 @@ def counted() -> dict[str, Any]:
     """
     from dubins_traffic.envs.parallel import TrafficParallelEnv
     from dubins_traffic.falsification.coverage import possible
-    from dubins_traffic.falsification.sentences import sentence_of
+    from dubins_traffic.falsification.judging import sentence_of
 
     one, many = single(CONFIG), vector(2, CONFIG, autoreset_mode="Disabled")
     agents = TrafficParallelEnv(CONFIG)

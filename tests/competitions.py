@@ -98,8 +98,9 @@ def judged(number: int, **changes: Any) -> Judged:
         "icra2016": None,
         **{name: value for name, value in changes.items() if name not in ("owner", "log", "frames")},
     }
-    own = {name: changes[name] for name in ("owner", "log", "frames") if name in changes}
-    return Judged(number, row, row["end"], **own)
+    own = {"owner": None, "log": "", "frames": None}
+    own |= {name: changes[name] for name in own if name in changes}
+    return Judged(number=number, row=row, end=row["end"], **own)
 
 
 def results(values: Sequence[float]) -> list[Judged]:

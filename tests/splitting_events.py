@@ -19,10 +19,10 @@ from typing import Any, Final
 
 import numpy as np
 
+from dubins_traffic.campaign.report.statistics import clopper_pearson
 from dubins_traffic.engine.group import Group
 from dubins_traffic.falsification.companies import Driven
-from dubins_traffic.falsification.intervals import clopper_pearson
-from dubins_traffic.falsification.replicas import Replicas, combined
+from dubins_traffic.falsification.estimate import Replicas, combined
 from dubins_traffic.falsification.sampling import STREAM, prepared
 from dubins_traffic.falsification.splitting import split
 from dubins_traffic.problem.configuration import Configuration

@@ -181,7 +181,7 @@ def _html_of(value: Any) -> str:
 
 
 def _rows_of(value: Any) -> list[dict[str, Any]]:
-    from dubins_traffic.campaign.frames import rows_of
+    from dubins_traffic.campaign.results import rows_of
 
     return rows_of(value)
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from pyarrow import parquet
 
-from dubins_traffic.campaign import ray_driver, ray_engine
 from dubins_traffic.cli.main import main
+from dubins_traffic.runs import ray_crew, ray_driver
 from tests import ray_cluster
 from tests.campaigns import campaign, command, logged, run, succeed, written
 
@@ -66,7 +66,7 @@ def test_workers_nodes_and_the_head_are_killed(
         assert len(set((many / "log").read_text().split())) >= ray_cluster.NODES
 
         file = written(lost, DOCUMENT)
-        monkeypatch.setattr(ray_engine, "SILENCE", SILENCE)
+        monkeypatch.setattr(ray_crew, "SILENCE", SILENCE)
         killed: list[float] = []
 
         def kill() -> None:
@@ -89,7 +89,7 @@ def test_workers_nodes_and_the_head_are_killed(
 
 
 def test_a_lost_head_is_told_within_half_a_minute() -> None:
-    assert ray_engine.SILENCE + ray_driver.PULSE < 30.0
+    assert ray_crew.SILENCE + ray_driver.PULSE < 30.0
 
 
 def finished(out: Path) -> int:

@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
+from dubins_traffic.campaign.report.statistics import clopper_pearson
 from dubins_traffic.campaign.results import load_results
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.crew import Here
 from dubins_traffic.falsification.estimate import by_counting
-from dubins_traffic.falsification.intervals import clopper_pearson
 from dubins_traffic.falsification.sampling import prepared
 from dubins_traffic.falsification.search import falsify
 from dubins_traffic.problem.configuration import load_config

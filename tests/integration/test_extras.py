@@ -94,7 +94,7 @@ ASKED = (
     Asked("convert grid.json -o w.sdf"),
     Asked("convert grid.json -o g.net.xml"),
     Asked("falsify junction --controller simple --trials 2 --duration 2 -o found"),
-    Asked("estimate junction --controller simple --event 1.collision --trials 4 --duration 2"),
+    Asked("estimate junction --controller simple --event 1.collision --trials 4 --duration 2", ("scipy",)),
     Asked("template python entry"),
     Asked("competition new spring"),
     Asked("competition check spring"),

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 
 import dubins_traffic as dt
+from dubins_traffic.campaign.report.statistics import clopper_pearson
 from dubins_traffic.cli.main import main
 from dubins_traffic.falsification import search
 from dubins_traffic.falsification.archive import files
 from dubins_traffic.falsification.case import Case, read_case
 from dubins_traffic.falsification.companies import Driven
 from dubins_traffic.falsification.estimate import by_counting, by_splitting, drawn
-from dubins_traffic.falsification.intervals import clopper_pearson
 from dubins_traffic.falsification.judging import confirm, judge
 from dubins_traffic.falsification.shrink import single_removals
 from dubins_traffic.falsification.splitting import Particle, follow, split

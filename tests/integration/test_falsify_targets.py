@@ -13,7 +13,7 @@ import pytest
 import dubins_traffic as dt
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsification import evolution, search, trying
+from dubins_traffic.falsification import search, strategies, trying
 from dubins_traffic.falsification.archive import files
 from dubins_traffic.falsification.judging import judge
 from dubins_traffic.falsification.liveness import limit_of
@@ -140,7 +140,7 @@ def test_by_how_much_a_formula_holds_guides_a_search(tmp_path: Path, monkeypatch
     Few trials are drawn anew: what these find, they find with and without it.
     """
     monkeypatch.setattr(search, "GENERATION", 16)
-    monkeypatch.setattr(evolution, "FRESH", 0.1)
+    monkeypatch.setattr(strategies, "FRESH", 0.1)
     measured = trying.tried_of
 
     def blind(*given: object) -> Tried:

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 from sqlalchemy import select
 
-from dubins_traffic.competition.keys import make_key_file
+from dubins_traffic.competition.sealing import make_key_file
 from dubins_traffic.errors import InputError
 from dubins_traffic.service import viewing
 from dubins_traffic.service.hiding import HiddenError

@@ -12,7 +12,7 @@ import platformdirs
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.competition.frames_hash import FramesHash
+from dubins_traffic.competition.judging import FramesHash
 from dubins_traffic.competition.submission import check_submission
 from dubins_traffic.errors import InputError
 from dubins_traffic.sandbox import BoxedController, Layers, boxed_controller, images

@@ -11,9 +11,9 @@ from referencing import Registry, Resource
 
 from dubins_traffic.campaign.campaign import Campaign, load_campaign, seed_of
 from dubins_traffic.campaign.chunks import LEAST_CAR_STEPS, MOST_CAR_STEPS, Pace, cost
-from dubins_traffic.campaign.factors import put, raised, scalar, vary
 from dubins_traffic.campaign.folder import remaining
 from dubins_traffic.campaign.schema import campaign_schema, shipped_campaign_schema
+from dubins_traffic.campaign.settings import put, raised, scalar, vary
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw

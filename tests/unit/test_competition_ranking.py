@@ -122,7 +122,7 @@ def test_a_trial_without_rules_is_clean_if_nothing_was_touched() -> None:
 )
 def test_a_result_is_read_as_it_was_written_or_refused(change: dict[str, object]) -> None:
     row = {**dict.fromkeys(RESULT), **judged(0).row}
-    own = Judged(0, row, "duration", None, "said", "00")
+    own = Judged(number=0, row=row, end="duration", owner=None, log="said", frames="00")
     assert Judged.from_json(own.to_json()) == own
     with pytest.raises(InputError):
         Judged.from_json({**own.to_json(), **change})

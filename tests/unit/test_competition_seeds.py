@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.competition import keys, sealing
+from dubins_traffic.competition import sealing
 from dubins_traffic.competition.commitment import Seeds, check_belong, read_seeds
 from dubins_traffic.competition.competition import Phase
 from dubins_traffic.errors import InputError
@@ -123,17 +123,17 @@ def test_a_text_of_seeds_is_read_to_the_byte(change: tuple[str, str]) -> None:
 def test_a_key_lies_elsewhere_and_is_its_owners(phase: Phase, tmp_path: Path) -> None:
     for place in (tmp_path / "key", tmp_path / "sealed" / "key"):
         with pytest.raises(InputError, match="outside"):
-            keys.make_key_file(place, phase.folder)
+            sealing.make_key_file(place, phase.folder)
         with pytest.raises(InputError, match="outside"):
-            keys.read_key(place, phase.folder)
+            sealing.read_key(place, phase.folder)
     place = tmp_path.parent / f"{tmp_path.name}.key"
-    keys.make_key_file(place, phase.folder)
+    sealing.make_key_file(place, phase.folder)
     assert place.stat().st_mode & 0o077 == 0
-    key = keys.read_key(place, phase.folder)
+    key = sealing.read_key(place, phase.folder)
     sealing.seal(phase, key)
     assert len(phase.seeds(key)) == 6
     with pytest.raises(InputError, match="can't be written"):
-        keys.make_key_file(place, phase.folder)
+        sealing.make_key_file(place, phase.folder)
 
 
 def test_only_secret_seeds_are_sealed(tmp_path: Path) -> None:

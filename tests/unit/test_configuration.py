@@ -95,7 +95,7 @@ def test_version_1_says_more() -> None:
     )
     config = load_config(document)
     assert config.car == Car(0.6, Rectangle(1.0, 0.5), Bounds(speed_min=0.2))
-    assert config.settings.laser_value == Laser()
+    assert config.settings.laser == Laser()
     assert config.settings.radius == 2.0
     assert config.settings.obstacle_values == (
         DiscObstacle(1.0, 2.0, 3.0),

@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 import pytest
 
 import dubins_traffic as dt
-from dubins_traffic.campaign.frames import rows_of
+from dubins_traffic.campaign.results import rows_of
 from dubins_traffic.campaign.rows import SCORES
 from dubins_traffic.display import Pictured
 from dubins_traffic.errors import InputError, MissingExtraError, in_python

@@ -1,10 +1,14 @@
 """Intervals of probabilities, against scipy's distributions."""
 
+import sys
+
 import numpy as np
 import pytest
 from scipy import stats
 
-from dubins_traffic.falsification.intervals import clopper_pearson, korn_graubard, student, wilson, worth
+from dubins_traffic.campaign.report.statistics import clopper_pearson, korn_graubard, wilson, worth
+from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.falsification.estimate import estimate
 
 
 @pytest.mark.parametrize(
@@ -17,9 +21,14 @@ def test_the_intervals_of_a_share_are_those_of_the_binomial_distribution(count: 
     assert wilson(count, total) == pytest.approx((score.low, score.high), rel=1e-9, abs=1e-12)
 
 
-@pytest.mark.parametrize("freedom", [1, 2, 9, 99])
-def test_the_quantile_is_that_of_students_distribution(freedom: int) -> None:
-    assert student(freedom) == pytest.approx(float(stats.t.ppf(0.975, freedom)), rel=1e-9)
+def test_an_estimate_names_the_extra_that_brings_scipy_before_it_runs_a_trial(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(sys.modules, "scipy.stats", None)
+    told: list[int] = []
+    with pytest.raises(MissingExtraError, match=r"install dubins-traffic\[falsify\]"):
+        estimate("demo", trials=2, progress=told.append)
+    assert told == []
 
 
 def test_the_interval_of_estimates_is_that_of_as_many_trials_as_vary_as_much() -> None:

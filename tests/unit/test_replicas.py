@@ -4,8 +4,8 @@ from itertools import starmap
 
 import pytest
 
-from dubins_traffic.falsification.intervals import clopper_pearson, korn_graubard
-from dubins_traffic.falsification.replicas import Replicas, combined
+from dubins_traffic.campaign.report.statistics import clopper_pearson, korn_graubard
+from dubins_traffic.falsification.estimate import Replicas, combined
 from dubins_traffic.falsification.splitting import Split
 
 

@@ -9,7 +9,7 @@ import pytest
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
-from dubins_traffic.competition.settings import Quota
+from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.hiding import NOTHING

@@ -12,7 +12,7 @@ from sqlalchemy import inspect, select, text
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.orm import Session
 
-from dubins_traffic.competition.settings import Quota
+from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, queue, submissions
 from dubins_traffic.service.database import Database
 from dubins_traffic.service.hiding import NOTHING

@@ -14,9 +14,17 @@ from typing import Any, cast
 
 from dubins_traffic import outside
 from dubins_traffic.campaign.chunks import Cell, Chunk, cut
-from dubins_traffic.campaign.factors import Scalar, levels, scalar, vary
 from dubins_traffic.campaign.rows import RESULT, WALL
-from dubins_traffic.campaign.settings import MOST_CELLS, MOST_TRIALS, CampaignModel, ConfigurationEntry
+from dubins_traffic.campaign.settings import (
+    MOST_CELLS,
+    MOST_TRIALS,
+    CampaignModel,
+    ConfigurationEntry,
+    Scalar,
+    levels,
+    scalar,
+    vary,
+)
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import is_file

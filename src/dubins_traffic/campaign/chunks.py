@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from dubins_traffic.campaign.factors import Scalar
+from dubins_traffic.campaign.settings import Scalar
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.problem.configuration import Configuration
 

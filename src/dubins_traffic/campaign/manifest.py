@@ -9,13 +9,14 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, Literal, cast
+
+from pydantic import Field
 
 from dubins_traffic.campaign.campaign import Campaign
-from dubins_traffic.campaign.manifest_model import ManifestModel
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, replace_file
-from dubins_traffic.problem.faults import parse
+from dubins_traffic.problem.faults import Open, parse
 from dubins_traffic.problem.files import parse_json
 from dubins_traffic.release import sources_hash
 from dubins_traffic.scoring.metric import Column
@@ -25,6 +26,43 @@ NAME = "manifest.json"
 CAMPAIGN = "campaign.json"
 OURS = "dubins-traffic"
 LIBRARIES = ("mcap", "numba", "numpy", "pyarrow")
+
+
+class Placed(Open):
+    """A controller or a metric: its name, where it is, and the SHA-256 of its file if it is one."""
+
+    name: str
+    place: str
+    file: str | None
+
+
+class ColumnModel(Open):
+    """A column of a further metric (`scoring.metric.Column`)."""
+
+    name: str
+    label: str
+    short: str
+    unit: str
+    better: Literal[-1, 0, 1]
+    kind: str
+    rare: bool
+    bounded: bool
+    meaning: str
+
+
+class ManifestModel(Open):
+    """A manifest. It tells the hash of the campaign, which must be that of the file beside it."""
+
+    format: int
+    trials: int
+    records: str
+    campaign: str
+    configurations: dict[str, str]
+    controllers: list[Placed] = Field(min_length=1)
+    metrics: list[Placed] = Field(default=[])
+    columns: list[ColumnModel] = Field(default=[])
+    versions: dict[str, str]
+    code: str
 
 
 def make(campaign: Campaign, records: str) -> dict[str, Any]:

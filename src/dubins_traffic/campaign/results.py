@@ -1,4 +1,4 @@
-"""The results of a campaign, read from its folder: for notebooks and data frames."""
+"""Results for notebooks and data frames: those of a campaign, read from its folder, and scores as rows of its table."""
 
 from __future__ import annotations
 
@@ -12,8 +12,11 @@ from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import manifest, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.display import pandas
+from dubins_traffic.engine.batch import Batch
 from dubins_traffic.errors import InputError
-from dubins_traffic.scoring.score import outcome
+from dubins_traffic.runs.single import Result
+from dubins_traffic.scoring.columns import SCORES
+from dubins_traffic.scoring.score import Score, ScoreSheet, outcome
 from dubins_traffic.viewer.notebook import shares_html
 
 
@@ -86,3 +89,22 @@ def load_results(folder: str | os.PathLike[str]) -> CampaignResults:
     campaign = manifest.stored_campaign(place, known)
     parts = [path for _, _, path in folders.parts(place)]
     return CampaignResults(place, campaign, table.read(place, campaign, parts))
+
+
+def rows_of(subject: object) -> list[dict[str, Any]]:
+    """Return one row a trial of a score, a score sheet, the result of a trial or a batch."""
+    if isinstance(subject, Score):
+        return [_row(subject)]
+    if isinstance(subject, ScoreSheet):
+        return [_row(score) for score in subject.trials]
+    if isinstance(subject, Result):
+        return [_row(subject.score)]
+    if isinstance(subject, Batch):
+        return [_row(outcome.score) for outcome in subject.outcomes]
+    raise TypeError(f"no table of a {type(subject).__name__}")
+
+
+def _row(score: Score) -> dict[str, Any]:
+    identity = {name: getattr(score, name) for name in ("trial", "seed", "controller", "record", "end")}
+    scores = {name: own.of(score) for name, own in SCORES.items()}
+    return {**identity, **scores, **{own.column.name: own.value for own in score.metrics}}

@@ -11,14 +11,12 @@ from pathlib import Path
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign, load_campaign
-from dubins_traffic.campaign.chunks import Chunk, Pace
-from dubins_traffic.campaign.engines import Engine
+from dubins_traffic.campaign.chunks import Pace
 from dubins_traffic.campaign.folder import Folder
-from dubins_traffic.campaign.pool import Pool
-from dubins_traffic.campaign.ray_engine import RayEngine, check_address
-from dubins_traffic.campaign.schedule import carry_out
-from dubins_traffic.campaign.worker import Surroundings
+from dubins_traffic.campaign.worker import Part
 from dubins_traffic.errors import InputError
+from dubins_traffic.runs.crew import Crew, carry_out
+from dubins_traffic.runs.ray_crew import check_address, crew_at
 
 Progress = Callable[[int, int], object]
 """Called with (trials done, trials in all) at the beginning and whenever a chunk is done."""
@@ -83,29 +81,27 @@ def run_campaign(
         if progress is not None:
             progress(before, campaign.total)
         if before < campaign.total:
-            around = Surroundings.here(own.records)
-            with contextlib.closing(_engine(workers, ray, around)) as engine:
-                run_left(own, engine, progress)
+            with contextlib.closing(crew_at(ray, workers or os.cpu_count() or 1)) as crew:
+                run_left(own, crew, progress)
         own.finish()
         return Ran(campaign, own.path, before)
 
 
-def run_left(own: Folder, engine: Engine[Chunk], progress: Progress | None = None) -> None:
-    """Run the remaining chunks of a campaign on `engine`, and store each in its folder; the table is not made yet.
+def run_left(own: Folder, crew: Crew, progress: Progress | None = None) -> None:
+    """Run the remaining chunks of a campaign, and store each in its folder; the table is not made yet.
 
-    The exceptions are those of `run_campaign`.
+    A trial that ends its process each time it is run becomes a row that says so. The exceptions are those of
+    `run_campaign`.
     """
     done = own.done()
     count = sum(end - first for first, end in done)
     pace = Pace()
-    for chunk, part in carry_out(engine, pace.pieces(folders.remaining(own.campaign.chunks(), done))):
-        own.keep(chunk, part)
-        pace.note(chunk, rows.answer_s(part))
-        count += chunk.count
+    left = pace.pieces(folders.remaining(own.campaign.chunks(), done))
+    parts = (Part(chunk, own.records) for chunk in left)
+    for part, found in carry_out(crew, parts, apart=lambda part: part.trials):
+        table = part.crashed() if found is None else found
+        own.keep(part.chunk, table)
+        pace.note(part.chunk, rows.answer_s(table))
+        count += part.chunk.count
         if progress is not None:
             progress(count, own.campaign.total)
-
-
-def _engine(workers: int | None, ray: str | None, around: Surroundings) -> Engine[Chunk]:
-    count = workers or os.cpu_count() or 1
-    return Pool(count, around) if ray is None else RayEngine(ray, count, around)

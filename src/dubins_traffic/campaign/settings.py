@@ -1,15 +1,22 @@
-"""Models of the campaign file: what it may say, and the defaults."""
+"""What a campaign file may say, and how the values of its factors are put into configurations."""
 
 from __future__ import annotations
 
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from copy import deepcopy
 from pathlib import PurePath
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, TypeAlias, cast
 
 from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
+from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
-from dubins_traffic.problem.faults import Strict, fault
+from dubins_traffic.problem.faults import Open, Strict, fault
 from dubins_traffic.problem.parts import Length
+from dubins_traffic.problem.settings import VERSION_0_KEYS, AgentEntry, Settings
+from dubins_traffic.roads.from_grid import most_segments
 from dubins_traffic.roads.generate import MOST_INTERSECTIONS
 
 NAME = r"^[^\s/\\][^/\\]*$"
@@ -173,3 +180,205 @@ class CampaignModel(Strict):
     chunk: Annotated[int, Field(ge=1, le=limits.TRIALS)] | None = Field(
         default=None, description="most trials in a unit of work; left out: by their length"
     )
+
+
+Scalar: TypeAlias = bool | int | float | str
+Document: TypeAlias = dict[str, Any]
+
+_STEP = re.compile(r"([^.\[\]]+)|\[(\d+)\]")
+
+
+def raised(document: Mapping[str, Any]) -> Document:
+    """Return a version 0 configuration as one of version 1 that means the same; others as they are."""
+    if document.get("version") != 0:
+        return deepcopy(dict(document))
+    known = {key: deepcopy(value) for key, value in document.items() if key in VERSION_0_KEYS}
+    agents = [{"type": entry["type"], "name": entry["name"]} for entry in known.get("e-agents", [])]
+    return {**known, "version": 1, "e-agents": agents, "ego": {"start": "origin"}}
+
+
+def vary(document: Mapping[str, Any], factors: Mapping[str, Any], fields: Mapping[str, Any]) -> Document:
+    """Return a configuration with one value of each factor put in.
+
+    Parameters
+    ----------
+    document : Mapping
+        A configuration; with no factor at all it is returned as it is.
+    factors : Mapping
+        Name of a factor of `Factors` to one of its values, as its model gives it.
+    fields : Mapping
+        Path of a field to its value.
+
+    Raises
+    ------
+    InputError
+        If a value has no place in this configuration; names the factor.
+    """
+    if not factors and not fields:
+        return deepcopy(dict(document))
+    own = raised(document)
+    for name, change in _CHANGES.items():
+        if name in factors:
+            try:
+                change(own, factors[name])
+            except InputError as error:
+                raise error.within(field=f"factors.{name}") from None
+    if "e_agents" in factors or "e_agent_kinds" in factors:
+        _agents(own, factors.get("e_agents"), factors.get("e_agent_kinds"))
+    for path, value in fields.items():
+        put(own, path, value)
+    return own
+
+
+def put(document: Document, path: str, value: Any) -> None:
+    """Set the field of `document` at `path`, such as ``car.bounds.speed`` or ``e-agents[0].count``.
+
+    Objects on the way are made where there are none.
+
+    Raises
+    ------
+    InputError
+        If `path` is not one, or leads through what is not an object or not so long a list.
+    """
+    steps: list[str | int] = [name or int(index) for name, index in _STEP.findall(path)]
+    if not steps or _written(steps) != path or isinstance(steps[0], int):
+        expected = "names joined by dots, with [k] for the k-th of a list"
+        raise InputError("not a path of a field", field="fields", value=path, expected=expected)
+    _check_known(path, steps)
+    place: Any = document
+    for step, after in zip(steps, [*steps[1:], None], strict=True):
+        inner = _below(place, step, path)
+        if after is None:
+            place[step] = deepcopy(value)
+            return
+        if isinstance(after, str) and (inner is None or isinstance(inner, bool)):
+            place[step] = inner = cast("Document", {})
+        place = inner
+
+
+def _below(place: Any, step: str | int, path: str) -> Any:
+    """Return what stands at `step` of an object or a list; None if an object has no such key."""
+    if isinstance(step, str) and isinstance(place, dict):
+        return cast("Document", place).get(step)
+    if isinstance(step, int) and isinstance(place, list) and step < len(cast("list[Any]", place)):
+        return cast("list[Any]", place)[step]
+    raise InputError(
+        "leads nowhere in this configuration", field=f"fields.{path}", value=step, expected="a field"
+    )
+
+
+def _check_known(path: str, steps: Sequence[str | int]) -> None:
+    """Refuse a name that a configuration would keep without knowing it: nothing would vary."""
+    checked: list[tuple[str | int, type[Open]]] = [(steps[0], Settings)]
+    if len(steps) > 2 and steps[0] == "e-agents":
+        checked.append((steps[2], AgentEntry))
+    for step, model in checked:
+        known = [info.alias or name for name, info in model.model_fields.items()]
+        if step not in known:
+            expected = f"one of {', '.join(known)}"
+            raise InputError("unknown key", field=f"fields.{path}", value=step, expected=expected)
+
+
+def scalar(value: Any) -> Scalar:
+    """Return the value of a factor as a table has it: numbers, switches and texts as they are, else in words."""
+    if isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Mapping):
+        table = cast("Mapping[str, Any]", value)
+        if set(table) == {"type", "parameters"}:
+            given = ", ".join(f"{name}={json.dumps(item)}" for name, item in table["parameters"].items())
+            return f"{table['type']}({given})" if given else str(table["type"])
+        return json.dumps(table, sort_keys=True)
+    items = cast("Sequence[Any]", value)
+    if len(items) == 2 and all(isinstance(item, int) for item in items):
+        return f"{items[0]}x{items[1]}"
+    if items and all(isinstance(item, Mapping) and "type" in item for item in items):
+        return "+".join(str(scalar(item)) for item in items)
+    return json.dumps(value, sort_keys=True)
+
+
+def levels(factors: Factors) -> dict[str, list[Any]]:
+    """Return the factors that are given, each with its values."""
+    given = factors.model_dump()
+    return {name: given[name] for name in Factors.model_fields if given[name] is not None}
+
+
+def _written(steps: Sequence[str | int]) -> str:
+    return "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in steps)[1:]
+
+
+def _grid(document: Document, shape: Sequence[int]) -> None:
+    network = _network_of(document)
+    grid: Document = network.get("grid") or {}
+    length = grid.get("length") or _length(document.get("rnd"))
+    document.pop("rnd", None)
+    own = {**grid, "rows": shape[0], "columns": shape[1]}
+    document["network"] = {"grid": own if length is None else {**own, "length": length}}
+
+
+def _intersections(document: Document, count: int) -> None:
+    """Ask for a random network of `count` intersections, as dense as the one asked for, else half as can be."""
+    wanted: Document = _network_of(document).get("random") or {}
+    share = 0.5
+    if wanted:
+        n = wanted["intersections"]
+        room = most_segments(n) - (n - 1)
+        share = (wanted["segments"] - (n - 1)) / room if room else 0.0
+    segments = count - 1 + round(share * (most_segments(count) - (count - 1)))
+    document.pop("rnd", None)
+    document["network"] = {"random": {**wanted, "intersections": count, "segments": segments}}
+
+
+def _network_of(document: Document) -> Document:
+    return document.get("network") or {}
+
+
+def _length(rnd: Any) -> float | None:
+    return cast("Document", rnd).get("length") if isinstance(rnd, dict) else None
+
+
+def _lane_width(document: Document, width: float) -> None:
+    put(document, "car.w", 0.5 * width)
+
+
+def _agents(document: Document, count: int | None, kinds: Sequence[Any] | None) -> None:
+    """Give `document` e-agents: `count` of them (None: as many as it has), of `kinds` (None: of its own) in turn."""
+    entries: list[Document] = document.get("e-agents") or []
+    if count is None:
+        count = sum(1 if entry.get("count") is None else entry["count"] for entry in entries)
+    pattern: Sequence[Document] = kinds if kinds is not None else entries
+    if count and not pattern:
+        raise InputError(
+            "the configuration has no e-agents to take in turn",
+            field="factors.e_agents",
+            value=count,
+            expected="e-agents in the configuration, or e_agent_kinds",
+        )
+    turns = [pattern[k % len(pattern)] for k in range(count)]
+    document["e-agents"] = [
+        {"type": entry["type"], "name": f"agent{k}", "parameters": deepcopy(entry.get("parameters", {}))}
+        for k, entry in enumerate(turns)
+    ]
+
+
+def _at(path: str) -> Callable[[Document, Any], None]:
+    return lambda document, value: put(document, path, value)
+
+
+def _duration(document: Document, seconds: float) -> None:
+    document.pop("duration_bounds", None)
+    document["duration"] = seconds
+
+
+_CHANGES: Mapping[str, Callable[[Document, Any], None]] = {
+    "grid": _grid,
+    "intersections": _intersections,
+    "lane_width": _lane_width,
+    "speed": _at("car.bounds.speed"),
+    "yaw_rate": _at("car.bounds.yaw_rate"),
+    "turning_radius": _at("car.bounds.turning_radius"),
+    "sensing_radius": _at("sensing_radius"),
+    "rules": _at("rules"),
+    "duration": _duration,
+}
+"""What each factor does, in this order; the e-agents follow."""

@@ -3,49 +3,64 @@
 from __future__ import annotations
 
 import contextlib
-import sys
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.engines import Errand, Numbered
-from dubins_traffic.campaign.records import Keep, Records
+from dubins_traffic.campaign.folder import Keep, Records
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch import run_together
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.outside import put_back
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.record.wall import remove_record
+from dubins_traffic.runs.crew import Cancelled, never
 from dubins_traffic.runs.jobs import Job
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import Maker
 
 if TYPE_CHECKING:
-    from multiprocessing.synchronize import Event
-
     from dubins_traffic.problem.configuration import Configuration
 
 TOGETHER = 64
 """Most trials that run together."""
+CRASH = "the process that ran it ended, each time it was run"
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What all workers need: which records are kept, and where modules of controllers are looked up."""
+class Part:
+    """The errand to run a chunk, and to make of it the bytes of its part of the table; `records` says what is kept."""
 
-    records: Records | None
-    paths: tuple[str, ...]
+    chunk: Chunk
+    records: Records | None = None
 
-    @staticmethod
-    def here(records: Records | None = None) -> Surroundings:
-        """Return the surroundings of this process."""
-        return Surroundings(records, (str(Path.cwd()), *sys.path))
+    @property
+    def number(self) -> int:
+        """The number of its first trial."""
+        return self.chunk.number
+
+    @property
+    def trials(self) -> Iterator[Part]:
+        """Its trials, one by one."""
+        for number in range(self.chunk.number, self.chunk.end):
+            yield Part(self.chunk.part(number, number + 1), self.records)
+
+    def run(self, cancelled: Cancelled) -> bytes:
+        """Run the chunk."""
+        with put_back():
+            found = run_chunk(self.chunk, self.records, cancelled)
+        return rows.encoded(found, scores.columns(self.chunk.metrics))
+
+    def crashed(self) -> bytes:
+        """Return the part of a table in which its trials ended their process each time they were run."""
+        metrics = scores.columns(self.chunk.metrics)
+        found = [rows.failure(own.number, rows.CRASHED, CRASH, metrics) for own in self.trials]
+        return rows.encoded(rows.columns(found, metrics), metrics)
 
 
-def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | None = None) -> rows.Columns:
+def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Cancelled = never) -> rows.Columns:
     """Run the trials of a chunk and return a row for each, whether it succeeds or fails.
 
     A trial that can't be drawn, run or scored is a row with its reason. `cancelled` interrupts the chunk.
@@ -73,20 +88,6 @@ def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Event | N
     return rows.columns([found[k] for k in range(chunk.count)], scores.columns(makers))
 
 
-def run_part(chunk: Numbered, around: Surroundings, cancelled: Event | None = None) -> bytes:
-    """Run a chunk and return its part of the table, a Parquet file; or an errand, and return what came of it."""
-    for path in around.paths:
-        if path not in sys.path:
-            sys.path.append(path)
-    if isinstance(chunk, Errand):
-        return chunk.run((lambda: False) if cancelled is None else cancelled.is_set)
-    if not isinstance(chunk, Chunk):
-        raise DubinsTrafficError(f"no work for a worker: {type(chunk).__name__}")
-    with put_back():
-        found = run_chunk(chunk, around.records, cancelled)
-    return rows.encoded(found, scores.columns(chunk.metrics))
-
-
 def _is_alone(chunk: Chunk, k: int, records: Records | None) -> bool:
     """Tell whether a trial has to run by itself.
 
@@ -106,7 +107,7 @@ def _is_recorded(records: Records, number: int, row: rows.Row) -> bool:
 
 
 def _together(
-    chunk: Chunk, some: Sequence[int], cancelled: Event | None, metrics: Sequence[Maker]
+    chunk: Chunk, some: Sequence[int], cancelled: Cancelled, metrics: Sequence[Maker]
 ) -> dict[int, rows.Row]:
     """Run trials of a chunk together; return the rows of those that fit a batch.
 
@@ -115,8 +116,7 @@ def _together(
     found: dict[int, rows.Row] = {}
     try:
         instances = list(draw_many(chunk.configuration, chunk.seed, [chunk.trial + k for k in some]))
-        stop = (lambda: False) if cancelled is None else cancelled.is_set
-        for outcome in run_together(instances, chunk.controller, stop, metrics):
+        for outcome in run_together(instances, chunk.controller, cancelled, metrics):
             k = outcome.instance.trial - chunk.trial
             found[k] = rows.row(chunk.number + k, outcome.ending, outcome.score, outcome.act_s)
     except (Exception, SystemExit):  # the trial at fault is found when each is run by itself
@@ -134,9 +134,9 @@ def _known(configuration: Configuration) -> Configuration:
 _last: list[Configuration] = []
 
 
-def _row(chunk: Chunk, k: int, records: Records | None, cancelled: Event | None) -> rows.Row:
+def _row(chunk: Chunk, k: int, records: Records | None, cancelled: Cancelled) -> rows.Row:
     number, trial = chunk.number + k, chunk.trial + k
-    if cancelled is not None and cancelled.is_set():
+    if cancelled():
         raise KeyboardInterrupt
     record = None if records is None else records.path(number)
     job = Job(

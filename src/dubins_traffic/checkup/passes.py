@@ -23,7 +23,7 @@ from dubins_traffic.checkup.watch import Place, Waited, ended, see_off
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.protocols import Closes, Controller, End
-from dubins_traffic.runs.jobs import deaf_to_interrupts
+from dubins_traffic.runs.processes import deaf_to_interrupts
 from dubins_traffic.runs.single import Result, run_trial
 
 DEADLINE = 5.0

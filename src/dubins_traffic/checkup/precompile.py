@@ -94,7 +94,7 @@ def _rehearsals(*, everything: bool) -> Iterator[Callable[[], object]]:
     if not everything:
         return
     problem = replace(town.problem, laser=Laser(), formulas={"far": "[] <>[0,1] !left_ego"})
-    noise = Disturbances(0.01, 0.01, 1, 0.1)
+    noise = Disturbances(position_noise=0.01, heading_noise=0.01, command_delay=1, command_loss=0.1)
     yield partial(run_trial, replace(town, problem=problem, disturbances=noise), "lanes")
     yield partial(_checked, town)
     for instance in scenarios().values():

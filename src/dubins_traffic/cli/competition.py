@@ -83,7 +83,7 @@ def seal(
 ) -> None:
     """Draw the secret seeds of a phase and write them encrypted; a key file that is not there is made."""
     from dubins_traffic.competition import sealing
-    from dubins_traffic.competition.keys import make_key_file
+    from dubins_traffic.competition.sealing import make_key_file
 
     sealing.cipher_class()
     own = _phase(file, phase)
@@ -186,7 +186,7 @@ def _phase(file: str, name: str) -> Phase:
 
 
 def _key(phase: Phase, key_file: str | None, *, confirm: bool = False) -> bytes:
-    from dubins_traffic.competition.keys import checked_key, read_key
+    from dubins_traffic.competition.sealing import checked_key, read_key
 
     if key_file is not None:
         return checked_key(read_key(Path(key_file), phase.folder))

@@ -169,10 +169,10 @@ def shrink(
     shield: options.Shield = False,
 ) -> None:
     """Take away from a case what its failure does not need; write what is left, with its replay page."""
-    from dubins_traffic.falsification.pages import write_page
+    from dubins_traffic.falsification.judging import write_page
     from dubins_traffic.falsification.shrink import shrink as smaller
     from dubins_traffic.problem.files import DOCUMENTS
-    from dubins_traffic.viewer.replay import PAGES
+    from dubins_traffic.viewer.pages import PAGES
 
     target = output or options.beside(case, ".small.json")
     page = options.beside(target, ".html")

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Sequence
 
 from dubins_traffic.cli.signals import hear_no_more, heard_again, listen
-from dubins_traffic.runs.left_threads import end_despite_threads
+from dubins_traffic.runs.processes import end_despite_threads
 
 FAILED = 1
 WRONG_SYSTEM = 2

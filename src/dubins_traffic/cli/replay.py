@@ -24,7 +24,8 @@ def replay(
     from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.score import score
     from dubins_traffic.viewer.marks import formula_marks
-    from dubins_traffic.viewer.replay import PAGES, write_replay
+    from dubins_traffic.viewer.pages import PAGES
+    from dubins_traffic.viewer.replay import write_replay
 
     output = output or options.beside(record, ".html")
     options.require(output, "a page", PAGES, overwrite=overwrite, apart_from=[record])

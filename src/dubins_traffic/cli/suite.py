@@ -153,7 +153,7 @@ def run(
     from dubins_traffic.campaign import table
     from dubins_traffic.suites import cases
     from dubins_traffic.suites.comparing import open_sources
-    from dubins_traffic.suites.seats import seated
+    from dubins_traffic.suites.run_suite import seated
     from dubins_traffic.suites.suite import load_suite
     from dubins_traffic.suites.writing import PAGE, write_results
 

@@ -9,10 +9,10 @@ import contextlib
 import errno
 import json
 import os
+import pickle
 from collections.abc import Callable, Generator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, cast
 
@@ -21,8 +21,7 @@ from dubins_traffic.competition.judging import Judged, judge
 from dubins_traffic.competition.submission import Submission
 from dubins_traffic.errors import InputError, WorkerLostError
 from dubins_traffic.files import locked, read_text, replace_file
-from dubins_traffic.runs.jobs import deaf_to_interrupts
-from dubins_traffic.runs.parent_watch import prepare_worker, spawning
+from dubins_traffic.runs.crew import Cancelled, Processes, carry_out
 
 RESULTS = "results.jsonl"
 
@@ -185,44 +184,35 @@ class _Work:
         return found
 
 
+@dataclass(frozen=True, slots=True)
+class _Errand:
+    """A trial for a worker; `work` is the same for all, pickled once."""
+
+    number: int
+    work: bytes
+
+    def run(self, cancelled: Cancelled) -> Judged:  # noqa: ARG002  # a trial in a box is run to its end
+        return _work(self.work).judged(self.number)
+
+
+@lru_cache(maxsize=1)
+def _work(pickled: bytes) -> _Work:
+    return pickle.loads(pickled)
+
+
 def _run(work: _Work, numbers: Sequence[int], workers: int) -> Generator[Judged]:
     if workers == 1 or len(numbers) < 2:
         yield from map(work.judged, numbers)
         return
-    yield from _in_processes(work, numbers, min(workers, len(numbers)))
-
-
-def _in_processes(work: _Work, numbers: Sequence[int], workers: int) -> Generator[Judged]:
-    waiting = list(reversed(numbers))
-    under_way: dict[Future[Judged], int] = {}
-    pool = ProcessPoolExecutor(workers, mp_context=spawning(), initializer=_begin, initargs=(work,))
-    try:
-        while waiting or under_way:
-            while waiting and len(under_way) < 2 * workers:
-                with deaf_to_interrupts():
-                    number = waiting.pop()
-                    under_way[pool.submit(_judged, number)] = number
-            done, _ = wait(under_way, return_when=FIRST_COMPLETED)
-            for future in done:
-                del under_way[future]
-                yield future.result()
-    except BrokenProcessPool:
-        raise WorkerLostError("a process ended in the middle of a trial; the same command goes on") from None
-    finally:
-        pool.shutdown(cancel_futures=True)
-
-
-_works: list[_Work] = []
-"""What a worker works on: one entry, set when its process begins."""
-
-
-def _begin(work: _Work) -> None:
-    _works[:] = [work]
-    prepare_worker()
-
-
-def _judged(number: int) -> Judged:
-    return _works[0].judged(number)
+    errands = map(partial(_Errand, work=pickle.dumps(work)), numbers)
+    with contextlib.closing(Processes(min(workers, len(numbers)))) as crew:
+        for errand, found in carry_out(crew, errands):
+            if found is None:
+                raise WorkerLostError(
+                    f"the process ended in the middle of trial {errand.number}, each time it was run; the same command "
+                    "goes on"
+                )
+            yield found
 
 
 def _begun(phase: Phase, submission: Submission, folder: Path) -> Evaluation:

@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from dubins_traffic.competition.settings import CompetitionModel, Limits, PhaseModel, Quota, Ranking
+from dubins_traffic.competition.competition import CompetitionModel, LimitsTable, PhaseModel, Quota, Ranking
 from dubins_traffic.competition.submission import Manifest
 from dubins_traffic.runs.catalogue import Parameter
 
@@ -14,7 +14,7 @@ _TABLES: dict[str, type[BaseModel]] = {
     "The competition": CompetitionModel,
     "`[ranking]`": Ranking,
     "`[phases.NAME]`": PhaseModel,
-    "`limits` of a phase": Limits,
+    "`limits` of a phase": LimitsTable,
     "`quota` of a phase": Quota,
     "`controller.toml` of a submission": Manifest,
 }

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from dubins_traffic.competition.settings import CompetitionModel
+from dubins_traffic.competition.competition import CompetitionModel
 from dubins_traffic.problem.schema import shipped_schema, with_configurations, write_schema
 
 NAME = "competition"

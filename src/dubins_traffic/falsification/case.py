@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast, get_type_hints
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsification.cells import Cell, Manoeuvre
+from dubins_traffic.falsification.coverage import Cell, Manoeuvre
 from dubins_traffic.files import require_output, write_text
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.files import DOCUMENTS, parse_json, read_source

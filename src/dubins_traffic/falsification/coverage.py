@@ -1,20 +1,119 @@
-"""Which rule, manoeuvre and crossing a search has put to the test: a table in which an empty cell is a warning."""
+"""Which rule, in which manoeuvre, at which crossing: the cells of an archive, and how often each was tried."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from enum import IntEnum
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dubins_traffic.falsification.cells import Cell, Manoeuvre
+from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.scoring.verdict import EGO_RULES
 
 if TYPE_CHECKING:
     from dubins_traffic.kernels.arrays import Ints
     from dubins_traffic.problem.instance import Instance
+
+
+DEGREES: Final = 5
+"""At most four roads meet at an intersection; 0 stands for none that is known."""
+
+
+class Manoeuvre(IntEnum):
+    """What the ego does."""
+
+    DRIVING = 0
+    """It is on a road."""
+    OVERTAKING = 1
+    """It is on a road and overtakes, left of the centre line or about to be."""
+    TURNED = 2
+    """It is on a road on which it has turned round."""
+    STRAIGHT = 3
+    """It goes straight on through a disc."""
+    LEFT = 4
+    """It turns left there."""
+    RIGHT = 5
+    """It turns right there."""
+    BACK = 6
+    """It leaves the disc by the road by which it came."""
+    ENTERING = 7
+    """It enters a disc that it does not leave before the end."""
+    LEAVING = 8
+    """It is in a disc in which it has started."""
+
+
+MANOEUVRES: Final = len(Manoeuvre)
+CELLS: Final = len(EGO_RULES) * MANOEUVRES * DEGREES
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Cell:
+    """One kind of failure: a rule (its name), a manoeuvre, and how many roads meet where it is about."""
+
+    rule: str
+    manoeuvre: Manoeuvre
+    degree: int
+
+    @property
+    def name(self) -> str:
+        """The cell as a name of a file: ``3.clear-left-4``."""
+        rule = self.rule.replace(" ", "-")
+        return f"{rule}-{self.manoeuvre.name.lower()}-{self.degree}"
+
+    @property
+    def number(self) -> int:
+        """The number of the cell, 0 to `CELLS` - 1; -1 of a cell of a user's own formula."""
+        if self.rule not in EGO_RULES:
+            return -1
+        return (EGO_RULES.index(self.rule) * MANOEUVRES + self.manoeuvre) * DEGREES + self.degree
+
+    @staticmethod
+    def of(number: int) -> Cell:
+        """Return the cell of a number."""
+        rest, degree = divmod(number, DEGREES)
+        rule, manoeuvre = divmod(rest, MANOEUVRES)
+        return Cell(EGO_RULES[rule], Manoeuvre(manoeuvre), degree)
+
+
+@dataclass(slots=True)
+class Counts:
+    """What became of the trials of a search: how many ran, and of these broke the assumption, failed, broke a rule.
+
+    `faults` counts those that failed by their ends; `first_fault` says which was the first of them, and why.
+    """
+
+    trials: int = 0
+    discarded: int = 0
+    faulty: int = 0
+    violated: int = 0
+    unconfirmed: int = 0
+    """Breaches that did not stand when they were judged afresh."""
+    faults: dict[str, int] = field(default_factory=dict[str, int])
+    first_fault: str = ""
+    exercised: Ints = field(default_factory=lambda: np.zeros(CELLS, dtype=np.int64))
+    broken: Ints = field(default_factory=lambda: np.zeros(CELLS, dtype=np.int64))
+
+    def to_json(self) -> dict[str, Any]:
+        """Return the counts as a JSON object."""
+        names = ("trials", "discarded", "faulty", "violated", "unconfirmed", "faults", "first_fault")
+        return {name: getattr(self, name) for name in names}
+
+    def take_fault(self, number: int, fault: str) -> None:
+        """Count trial `number` as one that ended by a fault, ``END: REASON``; nothing if it is empty."""
+        if fault:
+            end = fault.partition(":")[0]
+            self.faulty += 1
+            self.faults[end] = self.faults.get(end, 0) + 1
+            self.first_fault = self.first_fault or f"trial {number}: {fault}"
+
+    def fault_notice(self) -> str:
+        """Return the notice that trials ended by a fault; empty if none did."""
+        return fault_notice(self.faults, self.trials, self.first_fault)
+
 
 THROUGH: Final = (Manoeuvre.STRAIGHT, Manoeuvre.LEFT, Manoeuvre.RIGHT)
 ALONG: Final = {

@@ -3,30 +3,25 @@
 from __future__ import annotations
 
 import contextlib
-import pickle
-from collections import Counter
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Final, Protocol
 
 from dubins_traffic.campaign.chunks import fitting
-from dubins_traffic.campaign.engines import Engine
-from dubins_traffic.campaign.pool import Pool
-from dubins_traffic.campaign.ray_engine import RayEngine, check_address
-from dubins_traffic.campaign.worker import Surroundings
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError, WorkerLostError
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.trying import Laboratory, Tried, in_order
+from dubins_traffic.runs.crew import Cancelled, carry_out
+from dubins_traffic.runs.crew import Crew as Workers
+from dubins_traffic.runs.ray_crew import check_address, crew_at
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 LOT: Final = 32
 """Most trials that a worker is handed at a time."""
-LOSSES: Final = 3
-"""A lot whose worker ends so often is given up."""
 
 
 class Crew(Protocol):
@@ -73,56 +68,37 @@ class Lot:
     first: int
     instances: tuple[Instance, ...]
 
-    def run(self, cancelled: Callable[[], bool]) -> bytes:
-        """Run the trials; return what came of them, and how long their controller takes for an answer, pickled."""
+    def run(self, cancelled: Cancelled) -> tuple[list[Tried], float | None]:
+        """Run the trials; return what came of them, and how long their controller takes for an answer."""
         if self.controller not in _laboratories:
             _laboratories[self.controller] = Laboratory(self.controller)
         laboratory = _laboratories[self.controller]
         laboratory.cancelled = cancelled
-        return pickle.dumps((in_order(laboratory.attempt(self.instances)), laboratory.answer_s))
+        return in_order(laboratory.attempt(self.instances)), laboratory.answer_s
 
 
 _laboratories: dict[str, Laboratory] = {}
 
 
 class Elsewhere:
-    """Hands lots of trials to the engine of a campaign."""
+    """Hands lots of trials to workers."""
 
-    def __init__(self, controller: str, engine: Engine[Lot]) -> None:
+    def __init__(self, controller: str, workers: Workers) -> None:
         controllers.load(controller)
         self.make: Maker | Remote = maker(controller)
         self.name = controller
-        self._engine = engine
+        self._workers = workers
         self._number = 0
         self._answer_s: float | None = None
 
     def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
         """Run the trials of instances, lots of them at a time; a lot whose worker ends is run again, a few times."""
-        lots, again, losses = self._lots(instances), list[Lot](), Counter[int]()
-        under_way = 0
-        while True:
-            while under_way < self._engine.capacity:
-                lot = again.pop() if again else next(lots, None)
-                if lot is None:
-                    break
-                self._engine.submit(lot)
-                under_way += 1
-            if not under_way:
-                return
-            for outcome in self._engine.wait():
-                under_way -= 1
-                lot = outcome.chunk
-                if outcome.part is not None:
-                    found: tuple[list[Tried], float | None] = pickle.loads(outcome.part)
-                    tried, self._answer_s = found
-                    yield dict(enumerate(tried, lot.first))
-                    continue
-                losses[lot.number] += 1
-                if losses[lot.number] == LOSSES:
-                    raise WorkerLostError(
-                        f"workers end in the middle of trials: {self.name} may end its process"
-                    )
-                again.append(lot)
+        for lot, found in carry_out(self._workers, self._lots(instances)):
+            if found is None:
+                raise WorkerLostError(f"workers end in the middle of trials: {self.name} may end its process")
+            tried: list[Tried] = found[0]
+            self._answer_s = found[1]
+            yield dict(enumerate(tried, lot.first))
 
     def _lots(self, instances: Sequence[Instance]) -> Iterator[Lot]:
         """Yield lots of the trials of instances, of what their controller does in about a second."""
@@ -173,7 +149,5 @@ def crew_of(controller: str | Maker | Remote, name: str, workers: int, ray: str 
         )
     if ray is not None:
         check_address(ray)
-    around = Surroundings.here()
-    engine: Engine[Lot] = Pool(workers, around) if ray is None else RayEngine(ray, workers, around)
-    with contextlib.closing(engine):
-        yield Elsewhere(controller, engine)
+    with contextlib.closing(crew_at(ray, workers)) as crew:
+        yield Elsewhere(controller, crew)

@@ -1,8 +1,9 @@
-"""No false alarm: what a search has found is written as an instance and a record, read again, and judged afresh."""
+"""A trial of a search judged afresh: whether a failure stands, the sentence that tells it, the page that replays it."""
 
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -14,22 +15,115 @@ from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.falsification import contract
 from dubins_traffic.falsification.case import Case, Story
 from dubins_traffic.falsification.contract import limit_of
+from dubins_traffic.falsification.crew import driver_of, name_of
 from dubins_traffic.falsification.liveness import first_overdue, spare
 from dubins_traffic.falsification.remote import Remote
-from dubins_traffic.falsification.sentences import sentence_of
 from dubins_traffic.falsification.trying import Tried, broken_formulas, judged_record, tried_of
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.record.reader import Record, read
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.margins import LIVENESS
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Place, Ruling, Violation
+from dubins_traffic.viewer.replay import write_replay
 
 if TYPE_CHECKING:
     from dubins_traffic.engine.controlled import Maker
-    from dubins_traffic.falsification.cells import Cell
+    from dubins_traffic.falsification.case import Case
+    from dubins_traffic.falsification.coverage import Cell
+    from dubins_traffic.falsification.remote import Remote
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.protocols import Controller
+    from dubins_traffic.record.reader import Record
+    from dubins_traffic.scoring.score import Score
+    from dubins_traffic.scoring.verdict import Violation
+
+
+def sentence_of(record: Record, score: Score, breach: Violation) -> str:
+    """Return who did what when in a trial in which the ego broke a rule.
+
+    Parameters
+    ----------
+    record, score
+        The trial, up to the breach or farther.
+    breach
+        The ego's.
+    """
+    when = f"At {breach.time:.2f} s the ego"
+    match breach.rule:
+        case "1.collision":
+            return f"{when} {_collision(record, score, breach)}."
+        case "1.road":
+            return f"{when} left the road near ({breach.where.x:.1f}, {breach.where.y:.1f}) m."
+        case "2.left":
+            return f"{when} crossed the centre line of {_road(breach)} though nothing stood in its lane."
+        case "2.return":
+            since = f"as it had been since {breach.since:.2f} s"
+            return f"{when} was still left of the centre line of {_road(breach)}, {since}."
+        case "2.turn":
+            return f"{when} turned round on {_road(breach)}."
+        case rule if rule in contract.CONTRACT:
+            return contract.sentence_of(score.verdict, breach)
+        case "1.goal":
+            since = f"since {breach.since:.2f} s" if breach.since > 0.0 else "yet"
+            return f"{when} had not visited the goal {_crossing(breach)} {since}, which is longer than a gap may be."
+        case rule if rule.startswith("formula "):
+            place = f"({breach.where.x:.1f}, {breach.where.y:.1f}) m"
+            return f"At {breach.time:.2f} s the formula became false, the ego being at {place}."
+        case "3.stop" | "3.order" | "3.clear":
+            return f"{when} entered the crossing at {_crossing(breach)} {_entry(record, breach)}."
+        case rule:
+            return f"{when} broke {rule} near ({breach.where.x:.1f}, {breach.where.y:.1f}) m."
+
+
+def _collision(record: Record, score: Score, breach: Violation) -> str:
+    hits = [own for own in score.collisions if abs(own.time - breach.time) <= 1.5 / record.frames.rate]
+    other = hits[0].partner if hits else "something"
+    place = f"at {_crossing(breach)}" if breach.where.intersection else f"on {_road(breach)}"
+    speed = float(record.frames.speed[max(0, breach.tick - 1), EGO])
+    how = "standing" if abs(speed) < 0.01 else f"driving at {speed:.2f} m/s"
+    return f"touched {other} {place}, {how}"
+
+
+def _entry(record: Record, breach: Violation) -> str:
+    before = max(0, breach.tick - 1)
+    bits, crosses = record.frames.bits[before], record.frames.crosses[before]
+    names = record.instance.names
+    if breach.rule == "3.stop":
+        return "without having stopped at its line"
+    vertex = _vertex(record, breach)
+    if breach.rule == "3.clear":
+        inside = [names[n] for n in range(1, len(names)) if crosses[n] == vertex]
+        return f"while {' and '.join(inside) or 'another car'} was in it"
+    waiting = [
+        names[n]
+        for n in range(1, len(names))
+        if bits[n] & FLAG.STOPPED and _heads(record, n, before) == vertex
+    ]
+    return f"before its turn, while {' and '.join(waiting) or 'another car'} waited there"
+
+
+def _heads(record: Record, car: int, frame: int) -> int:
+    """Return the intersection at the end of a car's lane, -1 without lane state."""
+    lane = int(record.frames.lane[frame, car])
+    return -1 if lane < 0 else record.instance.problem.network.lane_ends(lane)[1]
+
+
+def _vertex(record: Record, breach: Violation) -> int:
+    where = breach.where.intersection
+    return -1 if where is None else record.instance.problem.network.vertex(where)
+
+
+def _crossing(breach: Violation) -> str:
+    where = breach.where.intersection
+    return "its place" if where is None else f"({where[0]}, {where[1]})"
+
+
+def _road(breach: Violation) -> str:
+    own = breach.where.segment
+    return "its road" if own is None else f"the road from ({own[0]}, {own[1]}) to ({own[2]}, {own[3]})"
+
 
 Make = Callable[[], "Controller"] | Remote
 """What makes the controller, or drives trials elsewhere."""
@@ -147,3 +241,27 @@ def case_in(instance: Instance, cell: Cell, make: Make, name: str) -> Case | Non
         sentence_of(found.record, found.score, breach),
     )  # fmt: skip
     return Case(found.record.instance, story)
+
+
+def write_page(
+    case: Case,
+    path: str | os.PathLike[str],
+    controller: str | Remote | None = None,
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Write the page that replays a case, driven by its controller or another; equal cases give equal bytes."""
+    driver = case.story.controller if controller is None else controller
+    name = name_of(driver)
+    judged = judge(case.instance, driver_of(driver), name)
+    record, verdict = judged.record, judged.score.verdict
+    own = [] if verdict is None else [broken.rule for broken in verdict.violations if broken.car == EGO_NAME]
+    summary = {
+        "rule": case.story.rule,
+        "what happens": case.story.sentence,
+        "controller": name,
+        "broken by the ego": ", ".join(dict.fromkeys(own)) or "nothing",
+    }
+    write_replay(
+        path, record.instance, record.frames, record.ending, summary, (), verdict, overwrite=overwrite
+    )

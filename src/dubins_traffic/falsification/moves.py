@@ -1,14 +1,19 @@
-"""Small changes of what a search tries: of one choice, of where a car starts, of what one car does, of the goals."""
+"""Small changes of what a search tries: where a car starts, whom it meets, what it chooses, the goals."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from math import floor, hypot
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
 
 from dubins_traffic.agents import choices
+from dubins_traffic.agents.choices import CHOICE
 from dubins_traffic.cars.state import EGO, Pose
-from dubins_traffic.falsification.meetings import joined
-from dubins_traffic.falsification.standing import far_off, span_of, started, starts_of
+from dubins_traffic.falsification.genome import Genome
+from dubins_traffic.problem.starts import Ground, areas_of, gap_radius
 
 if TYPE_CHECKING:
     import numpy as np
@@ -16,6 +21,209 @@ if TYPE_CHECKING:
     from dubins_traffic.falsification.genome import Genome
     from dubins_traffic.problem.configuration import Configuration
     from dubins_traffic.problem.instance import Instance
+
+
+SHIFT: Final = 1.5
+"""Metres by which a start is shifted at most, standard deviation; the least is a hundredth of it."""
+SQUARE: Final = 4.0
+"""Metres; places are looked for in squares of this side."""
+ON_LANE: Final = 1e-6
+"""Metres that a start may lie beside the middle of its lane."""
+
+
+class Place(NamedTuple):
+    """Where cars may start: start (x, y) and direction (c, s) of a lane's middle, from which to which metre, and its
+    number.
+    """
+
+    x: float
+    y: float
+    c: float
+    s: float
+    low: float
+    high: float
+    lane: int
+
+
+class Lots(NamedTuple):
+    """All places where cars may start, lane by lane.
+
+    `first` and `last` are the numbers of the first and the last place of each lane that has any; `ends` the
+    intersections at its beginning and end; `near` the places that are near to each square of side `SQUARE`.
+    """
+
+    places: list[Place]
+    near: dict[tuple[int, int], list[int]]
+    first: dict[int, int]
+    last: dict[int, int]
+    ends: dict[int, tuple[int, int]]
+
+
+def far_off(dice: np.random.Generator) -> float:
+    """Return metres by which to shift something: small ones as often as large ones."""
+    return SHIFT * 10.0 ** (-2.0 * dice.random()) * float(dice.standard_normal())
+
+
+def starts_of(genome: Genome, base: Instance) -> list[Pose]:
+    """Return where the cars of a genome start."""
+    return [genome.starts.get(n, pose) for n, pose in enumerate(base.starts)]
+
+
+def started(genome: Genome, base: Instance, starts: list[Pose], moved: Mapping[int, Pose]) -> Genome:
+    """Return a genome with other starts; the same if one that is moved would be too near to another car."""
+    apart = gap_radius(base.problem.car)
+    for car, own in moved.items():
+        for n, pose in enumerate(starts):
+            if n != car and hypot(pose.x - own.x, pose.y - own.y) < apart:
+                return genome
+    return Genome(genome.base, genome.root, {**genome.starts, **moved}, genome.tables)
+
+
+def span_of(base: Instance, pose: Pose) -> tuple[float, float] | None:
+    """Return how many metres back (negative) and ahead a start may be shifted in its lane; None for nowhere."""
+    lots = lots_of(base)
+    spot = spot_of(lots, pose)
+    if spot is None:
+        return None
+    k, along = spot
+    own = lots.places[k]
+    return min(own.low - along, 0.0), max(own.high - along, 0.0)
+
+
+def spot_of(lots: Lots, pose: Pose) -> tuple[int, float] | None:
+    """Return in which of the places where cars may start a start is, and after how many metres of its lane."""
+    places = lots.places
+    for k in lots.near.get(_square(pose.x, pose.y), ()):
+        x, y, c, s, low, high, _ = places[k]
+        if c * pose.c + s * pose.s > 1.0 - ON_LANE:
+            dx, dy = pose.x - x, pose.y - y
+            along = dx * c + dy * s
+            if abs(dy * c - dx * s) < ON_LANE and low - ON_LANE < along < high + ON_LANE:
+                return k, along
+    return None
+
+
+def pose_at(lots: Lots, place: int, along: float) -> Pose:
+    """Return the pose in a place where cars may start that is nearest to some metres of its lane."""
+    x, y, c, s, low, high, _ = lots.places[place]
+    far = min(max(along, low), high)
+    return Pose(x + far * c, y + far * s, c, s)
+
+
+def lots_of(base: Instance) -> Lots:
+    """Return where cars may start on the roads of an instance; kept with the network."""
+    problem = base.problem
+    key = _FREE, problem.car, problem.intersection_radius, problem.obstacles
+    found = problem.network.known.get(key)
+    if found is None:
+        ground = Ground(problem.network, problem.car, problem.intersection_radius, problem.obstacles)
+        lines, free = areas_of(ground).outside.tables()
+        columns = np.column_stack((lines[free.lane], free.low, free.high)).tolist()
+        places = [
+            Place(x, y, c, s, low, high, lane)
+            for (x, y, c, s, low, high), lane in zip(columns, free.lane.tolist(), strict=True)
+        ]
+        first: dict[int, int] = {}
+        last: dict[int, int] = {}
+        for k, own in enumerate(places):
+            first.setdefault(own.lane, k)
+            last[own.lane] = k
+        ends = {lane: problem.network.lane_ends(lane) for lane in first}
+        found = problem.network.known[key] = Lots(places, _near(places), first, last, ends)
+    return found  # pyright: ignore[reportReturnType]  # what stands under our own key
+
+
+def _square(x: float, y: float) -> tuple[int, int]:
+    return floor(x / SQUARE), floor(y / SQUARE)
+
+
+def _near(places: list[Place]) -> dict[tuple[int, int], list[int]]:
+    """Return the numbers of the places, ascending, that have a part in or beside each square."""
+    near: dict[tuple[int, int], list[int]] = {}
+    for k, (x, y, c, s, low, high, _) in enumerate(places):
+        steps = 1 + floor((high - low) / SQUARE)
+        met = {_square(x + far * c, y + far * s) for far in np.linspace(low, high, 1 + steps).tolist()}
+        for i, j in {(i + di, j + dj) for i, j in met for di in (-1, 0, 1) for dj in (-1, 0, 1)}:
+            near.setdefault((i, j), []).append(k)
+    return near
+
+
+_FREE = "falsify starts"
+
+
+COMES, LEAVES, LEADS = 0.55, 0.7, 0.9
+"""Up to which share of the cars brought to the ego they come to its crossing, are behind it, or are ahead of the ego;
+the others are in the lane beside."""
+PAUSES: Final = 0.7
+"""Share of the cars ahead of the ego, or behind its crossing, that pause there."""
+
+
+def joined(genome: Genome, base: Instance, cars: tuple[int, ...], dice: np.random.Generator) -> Genome:
+    """Return a genome of which one e-agent starts where it meets the ego soon; the same where that can't be.
+
+    It starts on another arm of the intersection to which the ego drives first, about as far away; on a road that leads
+    away from there; ahead of the ego in its lane; or in the lane beside. One that is in the ego's way may pause.
+
+    Parameters
+    ----------
+    genome, base
+        What is changed, and the instance of the number `genome.base`.
+    cars
+        The cars whose starts may be changed.
+    dice
+        What the change follows from.
+    """
+    others = [car for car in cars if car != EGO and _is_free(base, car)]
+    if not others:
+        return genome
+    car = others[int(dice.integers(len(others)))]
+    lots = lots_of(base)
+    kind, near = dice.random(), far_off(dice)
+    place = _place(genome, base, lots, kind, near, dice)
+    if place is None:
+        return genome
+    starts = starts_of(genome, base)
+    starts[car] = pose_at(lots, *place)
+    if COMES <= kind < LEADS and car in genome.tables and dice.random() < PAUSES:
+        table = genome.tables[car].copy()
+        low, high = choices.BOUNDS[CHOICE.PAUSE].tolist()
+        table[0, CHOICE.PAUSE], table[0, CHOICE.PAUSE_AT] = low + (high - low) * dice.random(), 0.0
+        genome = replace(genome, tables={**genome.tables, car: table})
+    return started(genome, base, starts, {car: starts[car]})
+
+
+def _is_free(base: Instance, car: int) -> bool:
+    """Tell whether a car may be on any lane."""
+    return base.e_agents[car - 1].driver.parameters.get("goes") != "loop"
+
+
+def _place(
+    genome: Genome, base: Instance, lots: Lots, kind: float, near: float, dice: np.random.Generator
+) -> tuple[int, float] | None:
+    """Return the place where cars may start in which one meets the ego, and metres of its lane; None for none."""
+    spot = spot_of(lots, genome.starts.get(EGO, base.starts[EGO]))
+    if spot is None:
+        return None
+    (places, _, first, last, ends), (own, along) = lots, spot
+    lane = places[own].lane
+    vertex = ends[lane][1]
+    if kind < LEAVES:
+        end = 1 if kind < COMES else 0
+        arms = [other for other in ends if other // 2 != lane // 2 and ends[other][end] == vertex]
+        if not arms:
+            return None
+        arm = arms[int(dice.integers(len(arms)))]
+        if kind < COMES:
+            return last[arm], places[last[arm]].high - places[own].high + along + near
+        return first[arm], places[first[arm]].low + abs(near)
+    if kind < LEADS:
+        return own, along + gap_radius(base.problem.car) + abs(near)
+    beside = last.get(lane ^ 1)
+    if beside is None:
+        return None
+    low, high = places[beside].low, places[beside].high
+    return beside, low + (high - low) * dice.random()
+
 
 OWN_CHOICE, OWN_START, JOINED, OTHERS_CAR = 0.55, 0.8, 0.9, 0.96
 """Up to which share of all changes a choice is changed, a start shifted, a car brought to the ego, a whole car taken

@@ -10,7 +10,7 @@ from typing import Any, Final
 import numpy as np
 import numpy.typing as npt
 
-from dubins_traffic.falsification.cells import DEGREES, MANOEUVRES, Cell, Manoeuvre
+from dubins_traffic.falsification.coverage import DEGREES, MANOEUVRES, Cell, Manoeuvre
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.propositions import FLAG

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 from dubins_traffic.agents import choices
@@ -99,10 +99,10 @@ def without_things(instance: Instance, frames: Frames) -> Iterator[Removal]:  # 
     for k in range(len(obstacles)):
         rest = (*obstacles[:k], *obstacles[k + 1 :])
         yield f"obstacle {k}", replace(instance, problem=replace(instance.problem, obstacles=rest))
-    for own in fields(Disturbances):
-        if getattr(instance.disturbances, own.name) != own.default:
-            undisturbed = replace(instance.disturbances, **{own.name: own.default})
-            yield f"the {own.name}", replace(instance, disturbances=undisturbed)
+    for name, own in Disturbances.model_fields.items():
+        if getattr(instance.disturbances, name) != own.default:
+            undisturbed = instance.disturbances.model_copy(update={name: own.default})
+            yield f"the {name}", replace(instance, disturbances=undisturbed)
 
 
 def without_roads(instance: Instance, frames: Frames) -> Iterator[Removal]:  # noqa: ARG001  # a `Way`

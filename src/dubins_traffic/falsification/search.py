@@ -18,13 +18,10 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.falsification import archive as archives
 from dubins_traffic.falsification.archive import Archive
 from dubins_traffic.falsification.case import Case
-from dubins_traffic.falsification.cells import Cell
 from dubins_traffic.falsification.contract import PROVOKED
-from dubins_traffic.falsification.counts import Counts
-from dubins_traffic.falsification.coverage import Row, coverage, possible
-from dubins_traffic.falsification.coverage_page import coverage_page
+from dubins_traffic.falsification.coverage import Cell, Counts, Row, coverage, possible
 from dubins_traffic.falsification.crew import Crew, crew_of, name_of
-from dubins_traffic.falsification.found import Found
+from dubins_traffic.falsification.found import Found, coverage_page
 from dubins_traffic.falsification.genome import Genome
 from dubins_traffic.falsification.judging import case_in
 from dubins_traffic.falsification.least import Least

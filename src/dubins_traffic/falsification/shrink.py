@@ -11,10 +11,9 @@ from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
 from dubins_traffic.falsification.case import Case, Story, read_case
 from dubins_traffic.falsification.crew import driver_of
-from dubins_traffic.falsification.judging import Judged, Make, confirm, judge
+from dubins_traffic.falsification.judging import Judged, Make, confirm, judge, sentence_of
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.removals import WAYS, Removal, Way, lead, removals
-from dubins_traffic.falsification.sentences import sentence_of
 from dubins_traffic.falsification.trying import Laboratory, in_order
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 

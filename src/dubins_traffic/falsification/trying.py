@@ -18,8 +18,8 @@ from dubins_traffic.engine.controlled import BatchController, Controlled, Maker,
 from dubins_traffic.engine.group import Group
 from dubins_traffic.engine.lanes_together import LanesTogether
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
-from dubins_traffic.falsification.cells import Cell, Manoeuvre
 from dubins_traffic.falsification.contract import Kept, kept
+from dubins_traffic.falsification.coverage import Cell, Manoeuvre
 from dubins_traffic.falsification.liveness import spare
 from dubins_traffic.falsification.passages import Passages, find_passages
 from dubins_traffic.falsification.remote import Remote

@@ -99,7 +99,7 @@ def trial_data(record: Record) -> TrialData:
     }
     Configuration.from_document(configuration)
     date = DATE if record.wall is None else record.wall.date[:19].replace("T", " ")
-    return TrialData(date, configuration, (instance_to_document(instance, version=0),))
+    return TrialData.of(date, configuration, [instance_to_document(instance, version=0)])
 
 
 def stamp(tick: int, rate: float) -> int:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Any
 
 from dubins_traffic.cars.state import Pose
@@ -68,10 +67,10 @@ def instance_to_document(instance: Instance, version: int = 1) -> dict[str, Any]
         "car": CarModel.document(problem.car),
         "rate": problem.rate,
         "sensing_radius": problem.sensing_radius,
-        "laser": asdict(problem.laser) if problem.laser else None,
+        "laser": problem.laser.model_dump() if problem.laser else None,
         "obstacles": [ObstacleModel.document(obstacle) for obstacle in problem.obstacles],
         "rules": dict(problem.rules) or False,
-        "disturbances": asdict(instance.disturbances),
+        "disturbances": instance.disturbances.model_dump(),
         "end_on_collision": instance.end_on_collision,
         "simulator": instance.simulator,
         **({"formulas": dict(problem.formulas)} if problem.formulas else {}),
@@ -151,7 +150,7 @@ def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: 
         car=car,
         rate=model.rate,
         sensing_radius=model.sensing_radius,
-        laser=model.laser_value,
+        laser=model.laser,
         obstacles=model.obstacle_values,
         e_agents=names[1:],
         rules=rules,
@@ -173,7 +172,7 @@ def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: 
         e_agents=agents,
         seed=seed,
         trial=trial,
-        disturbances=model.disturbances.core(),
+        disturbances=model.disturbances,
         end_on_collision=model.end_on_collision,
         simulator=model.simulator,
         extra=extra,

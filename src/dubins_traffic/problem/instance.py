@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Annotated, Any, Self
+
+from pydantic import Field, model_validator
 
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.read_only import read_only
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import Pictured, count
+from dubins_traffic.problem import limits
 from dubins_traffic.problem.curve_preconditions import check_curves
+from dubins_traffic.problem.faults import Strict, fault
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
@@ -18,35 +23,53 @@ if TYPE_CHECKING:
 NUDGED = "nudged"
 """The kind of e-agent that does what another kind does, delayed and with noise."""
 
-
-@dataclass(frozen=True, slots=True)
-class Laser:
-    """A laser scanner on a car's centre: `rays` over [angle_min, angle_max] radians, ranges in metres.
-
-    The defaults are the layout of 2016, whose scanner ran at 10 Hz.
-    """
-
-    rays: int = 300
-    angle_min: float = -2.0
-    angle_max: float = 2.0
-    range_min: float = 0.08
-    range_max: float = 5.0
-    rate: float = 10.0
+Length = Annotated[float, Field(ge=limits.LEAST, le=limits.METRES)]
+Angle = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 
-@dataclass(frozen=True, slots=True)
-class Disturbances:
-    """Seeded disturbances of the ego.
+class Laser(Strict):
+    """A laser scanner on the car's centre; the defaults are the layout of 2016."""
 
-    `position_noise` (m) and `heading_noise` (rad) are standard deviations of the observed pose; a command takes
-    effect `command_delay` ticks late (the car stands before the first); with probability `command_loss` a command
-    is lost and the last one in force stays.
-    """
+    rays: Annotated[int, Field(ge=1, le=limits.RAYS)] = Field(default=300, description="number of rays")
+    angle_min: Angle = Field(default=-2.0, description="bearing of the first ray, rad")
+    angle_max: Angle = Field(default=2.0, description="bearing of the last ray, rad")
+    range_min: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
+        default=0.08, description="smallest range, m"
+    )
+    range_max: Length = Field(default=5.0, description="largest range, m")
+    rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(default=10.0, description="scans per second")
 
-    position_noise: float = 0.0
-    heading_noise: float = 0.0
-    command_delay: int = 0
-    command_loss: float = 0.0
+    @model_validator(mode="after")
+    def _ordered(self) -> Laser:
+        if self.angle_max < self.angle_min or self.angle_max - self.angle_min > 2 * math.pi + 1e-9:
+            raise fault(
+                "not a field of view",
+                "angle_min <= angle_max <= angle_min + 2 pi",
+                "angle_max",
+                self.angle_max,
+            )
+        if self.range_max <= self.range_min:
+            raise fault(
+                "not a range", f"a number > range_min = {self.range_min}", "range_max", self.range_max
+            )
+        return self
+
+
+class Disturbances(Strict):
+    """Seeded disturbances of the ego."""
+
+    position_noise: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
+        default=0.0, description="standard deviation of the observed position, m"
+    )
+    heading_noise: Annotated[float, Field(ge=0, le=10)] = Field(
+        default=0.0, description="standard deviation of the observed heading, rad"
+    )
+    command_delay: Annotated[int, Field(ge=0, le=limits.DELAY)] = Field(
+        default=0, description="ticks by which commands take effect late"
+    )
+    command_loss: Annotated[float, Field(ge=0, le=1)] = Field(
+        default=0.0, description="probability that a command is lost and the last one stays in force"
+    )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -30,18 +29,15 @@ from dubins_traffic.cars.dynamics import check_name
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, fault
-from dubins_traffic.problem.instance import Disturbances, Laser
+from dubins_traffic.problem.instance import Laser, Length
 from dubins_traffic.rules.parameters import RuleParameters
 
-Length = Annotated[float, Field(ge=limits.LEAST, le=limits.METRES)]
 Width = Annotated[float, Field(ge=limits.WIDTHS[0], le=limits.WIDTHS[1])]
 Coordinate = Annotated[float, Field(ge=-limits.METRES, le=limits.METRES)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 LatticePoint = Annotated[list[int], Field(min_length=2, max_length=2)]
-Angle = Annotated[float, Field(ge=-1e6, le=1e6)]
 
 _CAR = Car()
-_LASER = Laser()
 
 
 class DiscModel(Strict):
@@ -149,42 +145,6 @@ class CarModel(Strict):
         return found
 
 
-class LaserModel(Strict):
-    """A laser scanner on the car's centre; the defaults are the layout of 2016."""
-
-    rays: Annotated[int, Field(ge=1, le=limits.RAYS)] = Field(
-        default=_LASER.rays, description="number of rays"
-    )
-    angle_min: Angle = Field(default=_LASER.angle_min, description="bearing of the first ray, rad")
-    angle_max: Angle = Field(default=_LASER.angle_max, description="bearing of the last ray, rad")
-    range_min: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
-        default=_LASER.range_min, description="smallest range, m"
-    )
-    range_max: Length = Field(default=_LASER.range_max, description="largest range, m")
-    rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(
-        default=_LASER.rate, description="scans per second"
-    )
-
-    @model_validator(mode="after")
-    def _ordered(self) -> LaserModel:
-        if self.angle_max < self.angle_min or self.angle_max - self.angle_min > 2 * math.pi + 1e-9:
-            raise fault(
-                "not a field of view",
-                "angle_min <= angle_max <= angle_min + 2 pi",
-                "angle_max",
-                self.angle_max,
-            )
-        if self.range_max <= self.range_min:
-            raise fault(
-                "not a range", f"a number > range_min = {self.range_min}", "range_max", self.range_max
-            )
-        return self
-
-    def core(self) -> Laser:
-        """Return the laser itself."""
-        return Laser(**self.model_dump())
-
-
 class DiscObstacleModel(Strict):
     """A static disc."""
 
@@ -235,27 +195,6 @@ class ObstacleModel(Strict):
         return {"polygon": {"vertices": [list(corner) for corner in obstacle.vertices]}}
 
 
-class DisturbancesModel(Strict):
-    """Seeded disturbances of the ego."""
-
-    position_noise: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
-        default=0.0, description="standard deviation of the observed position, m"
-    )
-    heading_noise: Annotated[float, Field(ge=0, le=10)] = Field(
-        default=0.0, description="standard deviation of the observed heading, rad"
-    )
-    command_delay: Annotated[int, Field(ge=0, le=limits.DELAY)] = Field(
-        default=0, description="ticks by which commands take effect late"
-    )
-    command_loss: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=0.0, description="probability that a command is lost and the last one stays in force"
-    )
-
-    def core(self) -> Disturbances:
-        """Return the disturbances themselves."""
-        return Disturbances(**self.model_dump())
-
-
 def _rule_field(name: str, default: float) -> tuple[Any, Any]:
     if isinstance(default, int):
         return (Annotated[int, Field(ge=0, le=limits.TRIALS)], Field(default, description=name))
@@ -295,7 +234,7 @@ def _with_switch(schema: dict[str, Any]) -> None:
 
 
 Rules = Annotated[RulesModel | None, BeforeValidator(_switch), Field(json_schema_extra=_with_switch)]
-LaserSwitch = Annotated[LaserModel | None, BeforeValidator(_switch), Field(json_schema_extra=_with_switch)]
+LaserSwitch = Annotated[Laser | None, BeforeValidator(_switch), Field(json_schema_extra=_with_switch)]
 
 
 ROADS = "a road network description (an object), or the path of one or of a map of another program"

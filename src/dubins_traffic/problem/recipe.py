@@ -58,8 +58,8 @@ class Recipe:
         self._radius = settings.radius
         self._rules = settings.rule_parameters
         self._obstacles = settings.obstacle_values
-        self._laser = settings.laser_value
-        self._disturbances = settings.disturbances.core()
+        self._laser = settings.laser
+        self._disturbances = settings.disturbances
         self._names = ("ego", *(plan.agent.name for plan in configuration.agents))
         self._steady = not any(drawn_cycle(plan.agent) for plan in configuration.agents)
         self._network = configuration.network

@@ -18,7 +18,7 @@ from dubins_traffic.problem.faults import Open, Strict
 from dubins_traffic.problem.kinds import KINDS, NAMES_2016, PROGRAM
 from dubins_traffic.problem.parts import LatticePoint, Length
 from dubins_traffic.problem.settings import InstanceModel, InstanceModel0, Settings, Settings0
-from dubins_traffic.problem.trial_data import TrialDataModel
+from dubins_traffic.problem.trial_data import TrialData
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 ID = "urn:dubins-traffic:"
@@ -156,7 +156,7 @@ def _describe_parameters(definitions: dict[str, Any]) -> None:
 
 
 def _trial_data() -> dict[str, Any]:
-    schema = _of(TrialDataModel)
+    schema = _of(TrialData)
     parts = {name: build for name, build in _DOCUMENTS.items() if name in {"configuration", "instance"}}
     schema["properties"]["trialconf"] = {"$ref": ID + "configuration"}
     schema["properties"]["instances"]["items"] = {"$ref": ID + "instance"}

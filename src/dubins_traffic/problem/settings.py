@@ -13,14 +13,12 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Careful, Open, Strict, fault
 from dubins_traffic.problem.formulas import Formulas
-from dubins_traffic.problem.instance import Laser
+from dubins_traffic.problem.instance import Disturbances, Length
 from dubins_traffic.problem.kinds import KINDS, NAMES_2016, NetworkPoint
 from dubins_traffic.problem.parts import (
     ROADS,
     CarModel,
-    DisturbancesModel,
     LaserSwitch,
-    Length,
     ObstacleModel,
     RoadReference,
     Rules,
@@ -208,9 +206,7 @@ class World(Careful):
     obstacles: list[ObstacleModel] = Field(
         default=[], max_length=limits.OBSTACLES, description="static obstacles"
     )
-    disturbances: DisturbancesModel = Field(
-        default=DisturbancesModel(), description="seeded disturbances of the ego"
-    )
+    disturbances: Disturbances = Field(default=Disturbances(), description="seeded disturbances of the ego")
     end_on_collision: bool = Field(default=False, description="whether a collision of the ego ends the trial")
     rules: Rules = Field(default=None, description="rules to judge; true: with all defaults")
     formulas: Formulas = Field(
@@ -246,11 +242,6 @@ class World(Careful):
     def obstacle_values(self) -> tuple[Obstacle, ...]:
         """The static obstacles."""
         return tuple(obstacle.core() for obstacle in self.obstacles)
-
-    @property
-    def laser_value(self) -> Laser | None:
-        """The laser, if the cars have one."""
-        return self.laser.core() if self.laser else None
 
 
 class Settings(World):

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from copy import deepcopy
-from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Annotated, Any
 
@@ -22,35 +20,13 @@ DATE_FORMAT = "%Y-%m-%d %H:%M:%S"
 DATE_PATTERN = r"^\d{4}-\d{2}-\d{2} \d{2}:\d{2}:\d{2}$"
 
 
-class TrialDataModel(Open):
+class TrialData(Open):
     """Trial data, version 0: as in 2016."""
 
     version: Annotated[int, Field(ge=0, le=0)] = Field(description="0")
     date: str = Field(pattern=DATE_PATTERN, description="when the trials began, YYYY-MM-DD HH:MM:SS, UTC")
     trialconf: dict[str, Any] = Field(description="the trials configuration")
     instances: list[dict[str, Any]] = Field(description="the problem instances, in the order of the trials")
-
-
-@dataclass(frozen=True, slots=True)
-class TrialData:
-    """A trial data file.
-
-    Parameters
-    ----------
-    date : str
-        When the trials began, ``YYYY-MM-DD HH:MM:SS``, UTC.
-    trialconf : Mapping
-        The trials configuration, a document.
-    instances : tuple of Mapping
-        The problem instances, documents, in the order of the trials.
-    extra : Mapping
-        Unknown keys, kept.
-    """
-
-    date: str
-    trialconf: Mapping[str, Any]
-    instances: tuple[Mapping[str, Any], ...]
-    extra: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     @staticmethod
     def build(configuration: Configuration, instances: Sequence[Instance], date: datetime) -> TrialData:
@@ -66,8 +42,15 @@ class TrialData:
             When the trials began; naive is taken as UTC.
         """
         moment = date.astimezone(UTC) if date.tzinfo else date
-        documents = tuple(instance_to_document(instance, version=0) for instance in instances)
-        return TrialData(moment.strftime(DATE_FORMAT), configuration.inlined(), documents)
+        documents = [instance_to_document(instance, version=0) for instance in instances]
+        return TrialData.of(moment.strftime(DATE_FORMAT), configuration.inlined(), documents)
+
+    @staticmethod
+    def of(date: str, trialconf: Mapping[str, Any], instances: Sequence[Mapping[str, Any]]) -> TrialData:
+        """Return trial data of documents."""
+        return TrialData(
+            version=0, date=date, trialconf=dict(trialconf), instances=[dict(own) for own in instances]
+        )
 
     @staticmethod
     def from_document(document: Mapping[str, Any], file: str | None = None) -> TrialData:
@@ -81,19 +64,17 @@ class TrialData:
         InputError
             For the first thing wrong, with its field.
         """
-        own = plain(document, file)
-        model = parse(TrialDataModel, own, file=file)
+        found = parse(TrialData, plain(document, file), file=file)
         try:
-            plan_agents(settings_of(model.trialconf).e_agents)
+            plan_agents(settings_of(found.trialconf).e_agents)
         except InputError as error:
             raise error.within(file=file, field="trialconf") from None
-        for k, instance in enumerate(model.instances):
+        for k, instance in enumerate(found.instances):
             try:
                 instance_from_document(instance)
             except InputError as error:
                 raise error.within(file=file, field=f"instances[{k}]") from None
-        extra = {key: value for key, value in own.items() if key not in TrialDataModel.model_fields}
-        return TrialData(model.date, own["trialconf"], tuple(own["instances"]), extra)
+        return found
 
     @staticmethod
     def read(source: str | os.PathLike[str]) -> TrialData:
@@ -116,13 +97,7 @@ class TrialData:
 
     def to_document(self) -> dict[str, Any]:
         """Return the document."""
-        return {
-            "version": 0,
-            "date": self.date,
-            "trialconf": deepcopy(dict(self.trialconf)),
-            "instances": [deepcopy(dict(instance)) for instance in self.instances],
-            **self.extra,
-        }
+        return self.model_dump()
 
     def write(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
         """Write the file, as `write_document` does."""

@@ -13,6 +13,7 @@ from dubins_traffic.record.sink import BY_CONTROLLER
 
 Fault = Literal["submission", "platform"]
 
+KIB: Final = 1 << 10
 MIB: Final = 1 << 20
 
 

@@ -14,7 +14,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session, joinedload
 
 from dubins_traffic.competition import competition as files
-from dubins_traffic.competition import keys
+from dubins_traffic.competition import sealing
 from dubins_traffic.errors import InputError
 from dubins_traffic.service.database import Database
 from dubins_traffic.service.hiding import NOTHING, Hiding, hiding_of
@@ -140,5 +140,5 @@ def _key(path: Path, folder: Path) -> bytes:
                 expected="the key with which they were made (--key-file)",
             )
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
-        keys.make_key_file(path, folder)
-    return keys.read_key(path, folder)
+        sealing.make_key_file(path, folder)
+    return sealing.read_key(path, folder)

@@ -5,7 +5,6 @@ Ray only carries them: what they work on, and what becomes of work whose actor o
 
 from __future__ import annotations
 
-import os
 import signal
 import socket
 from dataclasses import dataclass
@@ -16,13 +15,13 @@ from typing import Any
 
 import structlog
 
-from dubins_traffic.campaign.ray_engine import LOCAL, check_address
 from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.runs.ray_crew import check_address
+from dubins_traffic.runs.ray_driver import PACKAGE, join
 from dubins_traffic.service import logs
 from dubins_traffic.service.connection import Connection
 from dubins_traffic.service.worker import Worker, default_folder
 
-PACKAGE = "dubins-traffic"
 LOOK_S = 1.0
 FAREWELL_S = 300.0
 """How long actors are waited for that have been told to end; on a busy node one may take minutes."""
@@ -98,12 +97,8 @@ class Carrier:
 
     def __init__(self, address: str, task: Task, count: int | None = None) -> None:
         check_address(address)
-        os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
         self._ray: Any = import_module("ray")
-        quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
-        if address == LOCAL:
-            quiet |= {"num_cpus": count, "include_dashboard": False}
-        self._ray.init(address=address, **quiet)
+        join(self._ray, address, count)
         self._task = task
         self._count = count or max(1, int(self._ray.cluster_resources().get("CPU", 1)))
         self._actor = self._ray.remote(num_cpus=1, max_restarts=0, max_concurrency=2)(Carried)

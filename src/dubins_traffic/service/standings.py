@@ -27,7 +27,15 @@ DAY = 86400.0
 def judged(trials: Sequence[Trial], *, logs: bool = False) -> list[Judged]:
     """Return results as the ranking reads them, with their logs if these have been read."""
     return [
-        Judged(own.number, own.row, own.end, own.owner, own.log if logs else "", own.frames, own.ran)  # pyright: ignore[reportArgumentType]
+        Judged(
+            number=own.number,
+            row=own.row,
+            end=own.end,
+            owner=own.owner,  # pyright: ignore[reportArgumentType]
+            log=own.log if logs else "",
+            frames=own.frames,
+            ran=own.ran,
+        )
         for own in trials
     ]
 

@@ -11,7 +11,7 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session, defer, undefer
 
-from dubins_traffic.competition.settings import Quota
+from dubins_traffic.competition.competition import Quota
 from dubins_traffic.errors import DubinsTrafficError, shown
 from dubins_traffic.service import queue
 from dubins_traffic.service.hiding import Hiding

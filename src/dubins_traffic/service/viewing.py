@@ -80,7 +80,7 @@ def told_phase(office: Office, row: Phase, at: float) -> dict[str, Any]:
         "closes": iso(row.closes),
         "state": "closed" if row.is_closed(at) else "open" if row.is_open(at) else "to come",
         "trials": len(phase.numbers),
-        "limits": phase.limits.model_dump(),
+        "limits": phase.model.limits.model_dump(),
         "quota": phase.quota.model_dump(),
         "ranking": phase.ranking.model_dump(),
         "commitment": row.commitment,

@@ -22,8 +22,7 @@ from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.scoring.registry import STRATEGY_SHARE
 from dubins_traffic.suites.results import KEPT, played, save
-from dubins_traffic.suites.settings import CaseEntry
-from dubins_traffic.suites.suite import Suite
+from dubins_traffic.suites.suite import CaseEntry, Suite
 
 FILE: Final = "cases.jsonl"
 COLUMNS: Final = (*KEPT, STRATEGY_SHARE, "reason", *rows.WALL)

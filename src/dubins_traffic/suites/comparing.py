@@ -13,8 +13,14 @@ from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import exists
 from dubins_traffic.scoring.registry import STRATEGY_SHARE
-from dubins_traffic.suites.result_model import ResultModel, TrialsEntry, WallModel
-from dubins_traffic.suites.results import find_results, load_results, part
+from dubins_traffic.suites.results import (
+    ResultModel,
+    TrialsEntry,
+    WallModel,
+    find_results,
+    load_results,
+    part,
+)
 from dubins_traffic.suites.suite import SHORT, Suite
 
 

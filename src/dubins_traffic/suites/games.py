@@ -17,10 +17,8 @@ from pydantic import ValidationError
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import locked, make_folder, read_text, write_text
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.suites.result_model import GameResult
-from dubins_traffic.suites.results import save
-from dubins_traffic.suites.settings import GameEntry
-from dubins_traffic.suites.suite import Suite
+from dubins_traffic.suites.results import GameResult, save
+from dubins_traffic.suites.suite import GameEntry, Suite
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board

@@ -10,8 +10,8 @@ from typing import Any
 from pydantic import BaseModel
 
 from dubins_traffic.problem.schema import DIALECT, ID, shipped_schema, with_configurations, write_schema
-from dubins_traffic.suites.result_model import ResultModel
-from dubins_traffic.suites.settings import SuiteModel
+from dubins_traffic.suites.results import ResultModel
+from dubins_traffic.suites.suite import SuiteModel
 
 SUITE = "suite"
 RESULT = "suite-result"

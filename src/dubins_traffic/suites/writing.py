@@ -1,21 +1,53 @@
-"""Writing results of a suite: a page, a table in Markdown, and numbers as CSV."""
+"""Results of a suite: a page, a table in Markdown, and numbers as CSV."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
-from dubins_traffic.campaign.report.csv_tables import csv_files
+from dubins_traffic.campaign import rows
+from dubins_traffic.campaign.report.comparison import WALL_METRICS, Comparison, Standing, shown
 from dubins_traffic.campaign.report.page import page
+from dubins_traffic.campaign.report.statistics import Estimate, Share, share
+from dubins_traffic.campaign.report.write import csv_files
+from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, require_output, write_text
-from dubins_traffic.suites.cases_page import cases_page, cases_table, columns_of
-from dubins_traffic.suites.comparing import Source, compare_trials, made_by, shares, where_they_ran
-from dubins_traffic.suites.games_page import answers_of, games_page, games_table
-from dubins_traffic.suites.markdown import trials_table
-from dubins_traffic.suites.suite import Suite
+from dubins_traffic.record.sink import BY_CONTROLLER, FAULTS
+from dubins_traffic.scoring.clean import told_cut, was_cut
+from dubins_traffic.scoring.columns import SCORES, SECOND
+from dubins_traffic.scoring.verdict import Ruling
+from dubins_traffic.suites.comparing import (
+    Source,
+    check_suite,
+    compare_trials,
+    entry_name,
+    made_by,
+    named_entries,
+    shares,
+    where_they_ran,
+)
+from dubins_traffic.suites.games import agrees
+from dubins_traffic.suites.results import GameResult
+from dubins_traffic.suites.suite import GameEntry, Suite
+from dubins_traffic.viewer.pages import render
 
 PAGE = "index.html"
 TABLE = "results.md"
+NOTE = "Brackets: 95 % intervals, of means by bootstrap, of shares Wilson's."
+RIGHT: Mapping[bool | None, str] = {True: "right", False: "wrong", None: "no answer"}
+
+Columns = Mapping[str, Sequence[Any]]
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """The answers of one solver: `found` and `seconds`, by the names of the games."""
+
+    name: str
+    found: Mapping[str, GameResult]
+    seconds: Mapping[str, float]
 
 
 def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
@@ -31,16 +63,31 @@ def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
     note = "".join(f"\n{line}\n" for line in (*shares(sources), *told))
     if suite.model.cases is not None:
         found = columns_of(suite, sources)
-        return {TABLE: cases_table(suite, found) + note, PAGE: cases_page(suite, found, how)}
-    if suite.model.games is not None:
+        head, body, summary, made = ["case", *found], _case_lines(suite, found), "", {"hash": suite.hash}
+    elif suite.model.games is not None:
         answers = answers_of(suite, sources)
-        return {TABLE: games_table(suite, answers) + note, PAGE: games_page(suite, answers, how)}
-    comparison, made = compare_trials(suite, sources)
-    return {
-        **csv_files(comparison),
-        TABLE: trials_table(suite, comparison) + note,
-        PAGE: page(comparison, made, {}),
-    }
+        head, body, summary = _game_columns(answers), _game_lines(suite, answers), _summary(suite, answers)
+        made = {"suite": suite.name, "hash": suite.hash}
+    else:
+        comparison, manifest = compare_trials(suite, sources)
+        return {
+            **csv_files(comparison),
+            TABLE: trials_table(suite, comparison) + note,
+            PAGE: page(comparison, manifest, {}),
+        }
+    whole = render(
+        "suites/answers.html",
+        title=suite.label,
+        subtitle=suite.model.title,
+        heading="Cases" if suite.model.games is None else "Answers",
+        columns=head,
+        body=body,
+        summary=summary,
+        made=made,
+        how=how,
+    )
+    told = f"# {suite.name}\n\n{suite.model.title}. Hash `{suite.hash}`.\n\n{markdown_table(head, body)}"
+    return {TABLE: told + (f"\n{summary}\n" if summary else "") + note, PAGE: whole}
 
 
 def write_results(suite: Suite, sources: Sequence[Source], folder: Path, *, overwrite: bool = False) -> str:
@@ -60,3 +107,206 @@ def write_results(suite: Suite, sources: Sequence[Source], folder: Path, *, over
     for name, text in found.items():
         write_text(folder / name, text)
     return found[TABLE]
+
+
+def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
+    """Return a table; the first column to the left, the others to the right."""
+    lines = [head, [":--", *["--:"] * (len(head) - 1)], *body]
+    return "".join("| " + " | ".join(cell.replace("|", "\\|") for cell in line) + " |\n" for line in lines)
+
+
+def trials_table(suite: Suite, comparison: Comparison) -> str:
+    """Return a heading, the table of the controllers, the best by the suite's metric first, and how to read it."""
+    metric = SCORES[suite.model.metric].column
+    timed = [own for own in WALL_METRICS if own in comparison.metrics]
+    judged = any(standing.judged for standing in comparison.standings)
+    verdicts = [ruling.value for ruling in Ruling] if judged else []
+    head = [
+        "controller",
+        "trials",
+        f"{metric.heading}, mean",
+        "sum",
+        f"{SCORES[SECOND].column.heading}, mean",
+    ]
+    head += ["clean", *verdicts] if judged else []
+    head += [
+        "collisions",
+        "fault of the ego",
+        "ended by the controller",
+        "came to nothing",
+        *(f"{own.label}, ms" for own in timed),
+    ]
+    ranked = sorted(
+        comparison.standings,
+        key=lambda own: [_over_all(own, name) for name in (metric.name, SECOND)],
+        reverse=True,
+    )
+    body = [
+        [
+            standing.controller,
+            str(standing.trials),
+            _estimate(standing.estimates[metric.name]),
+            shown(_sum(standing.estimates[metric.name])),
+            _estimate(standing.estimates[SECOND]),
+            *(
+                [_clean_share(standing), *(_share(standing.verdicts.get(name)) for name in verdicts)]
+                if judged
+                else []
+            ),
+            str(standing.collisions),
+            str(standing.faults["the ego"] + standing.faults["both"]),
+            str(standing.ended.count),
+            str(sum(standing.ends[end].count for end in rows.NOTHING if end in standing.ends)),
+            *(_milliseconds(standing.estimates[own.name].mean) for own in timed),
+        ]
+        for standing in ranked
+    ]
+    count = comparison.campaign.cells[0].count
+    fewer = "" if count == suite.trials else f", {count} of {suite.trials} trials of each combination"
+    told = f"# {suite.name}{fewer}\n\n{suite.model.title}. Hash `{suite.hash}`."
+    return f"{told}\n\n{markdown_table(head, body)}\n{NOTE}\n"
+
+
+def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
+    """Return the columns of each entry in files of results, one value a case.
+
+    Raises
+    ------
+    InputError
+        If the suite is another one here, a name stands twice, or a file has not the cases of the suite.
+    """
+    check_suite(suite, sources)
+    count = len(suite.model.cases or ())
+    found: dict[str, Columns] = {}
+    for one in named_entries(sources):
+        columns = one.entry.columns
+        for name in ("end", "verdict", "clean", "breaches"):
+            if len(columns.get(name, ())) != count:
+                raise InputError(
+                    "a column is missing, or of another length",
+                    file=str(one.source.path),
+                    field=f"{one.entry.controller}.columns.{name}",
+                    expected=f"{count} values",
+                )
+        found[one.name] = columns
+    return found
+
+
+def answers_of(suite: Suite, sources: Sequence[Source]) -> list[Answers]:
+    """Return the answers in files of results.
+
+    Raises
+    ------
+    InputError
+        If the suite is another one here, or a name stands twice.
+    """
+    check_suite(suite, sources)
+    found: list[Answers] = []
+    for source in sources:
+        for entry in source.found.solvers:
+            name = entry_name(source, entry.solver, len(source.found.solvers))
+            if any(name == other.name for other in found):
+                raise InputError(
+                    "name taken", file=str(source.path), value=name, expected="NAME=PATH with another name"
+                )
+            seconds = {} if source.wall is None else source.wall.solvers.get(entry.solver, {})
+            found.append(Answers(name, entry.games, seconds))
+    return found
+
+
+def _case_lines(suite: Suite, found: Mapping[str, Columns]) -> list[list[str]]:
+    cases = suite.model.cases or ()
+    rows = [[case.name, *(_said(own, k) for own in found.values())] for k, case in enumerate(cases)]
+    ended = ["ended by the controller", *(str(_ended(own)) for own in found.values())]
+    return [*rows, ["clean", *(_clean(own) for own in found.values())], ended]
+
+
+def _said(columns: Columns, case: int) -> str:
+    """Return the verdict on a case, or how it ended if by a fault, and how many rules the ego broke."""
+    verdict, end, broken = (columns[name][case] for name in ("verdict", "end", "breaches"))
+    if verdict is None or end in FAULTS:
+        verdict = str(end).replace("_", " ")
+    return f"{verdict}, {broken} breach{'es' if broken != 1 else ''}" if broken else str(verdict)
+
+
+def _ended(columns: Columns) -> int:
+    return sum(end in BY_CONTROLLER for end in columns["end"])
+
+
+def _clean(columns: Columns) -> str:
+    cut = sum(map(was_cut, columns["verdict"], columns["clean"], columns["end"]))
+    own = share(sum(bool(value) for value in columns["clean"]), len(columns["clean"]) - cut)
+    low, high = own.interval or (0.0, 1.0)
+    return f"{own.count} of {own.total} [{low:.1%}, {high:.1%}]{told_cut(cut)}"
+
+
+def _game_columns(answers: Sequence[Answers]) -> list[str]:
+    head = ["game", "e-agents", "assumed", "positions", "won", "realizable"]
+    return head + [f"{own.name}{what}" for own in answers for what in ("", ", s")]
+
+
+def _game_lines(suite: Suite, answers: Sequence[Answers]) -> list[list[str]]:
+    return [
+        [
+            game.name,
+            str(game.cars),
+            game.assume or "nothing",
+            f"{game.positions:,}",
+            f"{game.winning:,}",
+            _realizable(game),
+            *(cell for own in answers for cell in _verdict_and_seconds(game, own)),
+        ]
+        for game in suite.model.games or ()
+    ]
+
+
+def _realizable(game: GameEntry) -> str:
+    if game.winning == game.positions:
+        return "everywhere"
+    return "somewhere" if game.winning else "nowhere"
+
+
+def _verdict_and_seconds(game: GameEntry, own: Answers) -> tuple[str, str]:
+    found = own.found.get(game.name)
+    right = None if found is None else agrees(game, found)
+    return RIGHT[right], shown(own.seconds.get(game.name))
+
+
+def _summary(suite: Suite, answers: Sequence[Answers]) -> str:
+    games = suite.model.games or ()
+    lines: list[str] = []
+    for own in answers:
+        right = sum(_verdict_and_seconds(game, own)[0] == RIGHT[True] for game in games)
+        spent = sum(own.seconds.get(game.name, 0.0) for game in games)
+        took = f" in {shown(spent)} s" if own.seconds else ""
+        lines.append(f"{own.name}: {right} of {len(games)} right{took}.")
+    return " ".join(lines)
+
+
+def _over_all(standing: Standing, name: str) -> float:
+    """Return the mean of a column over all trials; one that came to nothing counts 0, so no crash hides a trial."""
+    found = standing.estimates[name]
+    return (found.mean or 0.0) * found.count / max(1, standing.trials)
+
+
+def _sum(estimate: Estimate) -> float | None:
+    return None if estimate.mean is None else estimate.mean * estimate.count
+
+
+def _milliseconds(seconds: float | None) -> str:
+    return shown(None if seconds is None else 1e3 * seconds)
+
+
+def _estimate(estimate: Estimate) -> str:
+    ends = estimate.mean_interval
+    return shown(estimate.mean) + ("" if ends is None else f" [{shown(ends[0])}, {shown(ends[1])}]")
+
+
+def _clean_share(standing: Standing) -> str:
+    return _share(standing.clean) + told_cut(standing.cut)
+
+
+def _share(share: Share | None) -> str:
+    if share is None or share.share is None or share.interval is None:
+        return shown(None)
+    return f"{share.share:.1%} [{share.interval[0]:.1%}, {share.interval[1]:.1%}]"

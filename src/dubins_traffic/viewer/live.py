@@ -16,32 +16,12 @@ from typing import Any, Final
 
 import numpy as np
 
+from dubins_traffic.viewer.pages import part
 from dubins_traffic.viewer.raster_kernel import Image
 
 HOST: Final = "127.0.0.1"
 PATIENCE: Final = 10.0
 """Seconds after which a page that waits for a picture is told that there is none, and asks again."""
-PAGE: Final = b"""<!doctype html><html lang="en"><meta charset="utf-8"><title>dubins-traffic</title>
-<link rel="icon" href="data:,">
-<style>html,body{height:100%;margin:0;background:#f6f5f1}
-body{display:grid;place-items:center}img{max-width:100%;max-height:100%}</style>
-<img alt="the trial as it runs"><script>
-const picture = document.querySelector("img");
-async function follow() {
-  for (let number = 0; ; ) {
-    const answer = await fetch(`/newer/${number}`);
-    if (answer.status === 204) continue;
-    number = Number(answer.headers.get("number"));
-    const url = URL.createObjectURL(await answer.blob());
-    picture.src = url;
-    await picture.decode();
-    URL.revokeObjectURL(url);
-    document.body.dataset.shown = number;
-  }
-}
-follow().catch(() => { document.title = "dubins-traffic: ended"; });
-</script></html>
-"""
 
 
 def png(image: Image) -> bytes:
@@ -118,7 +98,7 @@ class _Answers(BaseHTTPRequestHandler):
         _, _, number = self.path.rpartition("/newer/")
         with contextlib.suppress(ConnectionError):
             if self.path == "/":
-                self._answer(200, "text/html", PAGE)
+                self._answer(200, "text/html", part("viewer/live.html").encode())
             elif not number.isdigit():
                 self._answer(404, "text/plain", b"there is the page / and no other\n")
             else:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import html
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,6 +15,7 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.scoring.score import Score, ScoreSheet
 from dubins_traffic.viewer import svg
 from dubins_traffic.viewer.marks import Mark, breach_marks, contact_mark, verdict_text
+from dubins_traffic.viewer.pages import render
 from dubins_traffic.viewer.paths import Paths
 
 ROWS = 12
@@ -103,23 +103,36 @@ def sheet_html(heading: str, sheet: ScoreSheet) -> str:
         )
         for own in sheet.trials[:ROWS]
     ]
-    return shares_html(heading, sheet.summary, found, table(head, rows, len(sheet.trials)))
+    return shares_html(heading, sheet.summary, found, head, rows, len(sheet.trials))
 
 
-def shares_html(heading: str, caption: str, shares: Mapping[str, Mapping[str, int]], more: str = "") -> str:
-    """Return the HTML of counts: a bar for each row, and `more`, which is HTML already."""
+def shares_html(
+    heading: str,
+    caption: str,
+    shares: Mapping[str, Mapping[str, int]],
+    head: Sequence[str] = (),
+    rows: Sequence[Sequence[str]] = (),
+    total: int = 0,
+) -> str:
+    """Return the HTML of counts, a bar for each row of `shares`, above the first `rows` of a table of `total`."""
     picture = svg.bars({row: dict(sorted(counts.items())) for row, counts in shares.items()})
-    return _page(picture, heading, caption) + more
+    return _page(picture, heading, caption, head, rows, total)
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[str]], total: int) -> str:
-    """Return a table as HTML; `total` is how many rows there would be."""
-    top = "".join(f'<th style="text-align:left">{html.escape(cell)}</th>' for cell in head)
-    lines = ("".join(f'<td style="text-align:left">{html.escape(cell)}</td>' for cell in row) for row in rows)
-    body = "".join(f"<tr>{line}</tr>" for line in lines)
-    rest = f"<p>and {total - len(rows)} more</p>" if total > len(rows) else ""
-    return f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>{rest}"
-
-
-def _page(picture: str, heading: str, caption: str) -> str:
-    return f"<div>{picture}<p><b>{html.escape(heading)}</b> {html.escape(caption)}</p></div>"
+def _page(
+    picture: str,
+    heading: str,
+    caption: str,
+    head: Sequence[str] = (),
+    rows: Sequence[Sequence[str]] = (),
+    total: int = 0,
+) -> str:
+    return render(
+        "viewer/notebook.html",
+        picture=picture,
+        heading=heading,
+        caption=caption,
+        head=head,
+        rows=rows,
+        total=total,
+    )

@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import base64
-import hashlib
-import html
-import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from importlib import resources
 from pathlib import Path
 from typing import Any, cast
 
@@ -35,6 +31,7 @@ from dubins_traffic.viewer.marks import (
     marks_of,
     verdict_text,
 )
+from dubins_traffic.viewer.pages import PAGES, part, render
 from dubins_traffic.viewer.scene import centre_lines, lane_hints, road_lines
 
 SCRIPTS = (
@@ -47,8 +44,6 @@ SCRIPTS = (
 )
 HEADING_STEPS = 32767
 UNITS = ("s", "m")
-PAGES = (".html", ".htm")
-"""How names of pages end."""
 
 
 def write_replay(
@@ -105,37 +100,13 @@ def replay_page(
     if len(frames) == 0:
         raise InputError("nothing to replay", field="frames", value=0, expected="at least one frame")
     title = f"Trial {instance.trial} of seed {instance.seed}"
-    style = _part("replay.css")
-    script = "\n".join(["(() => {", '"use strict";', *(_part(name) for name in SCRIPTS), "})();"])
+    style = part("viewer/replay.css")
+    script = "\n".join(["(() => {", '"use strict";', *(part(f"viewer/{name}") for name in SCRIPTS), "})();"])
     breaches = [] if verdict is None else breach_marks(instance, verdict.violations)
     every = marks_of(instance, frames, [*marks, *breaches])
     document = _document(title, instance, frames, ending, summary or {}, every)
     document["verdict"] = None if verdict is None else _verdict(instance, verdict, every)
-    fields = {
-        "TITLE": html.escape(title),
-        "STYLE": style,
-        "STYLE_HASH": _hash(style),
-        "SCRIPT": script,
-        "SCRIPT_HASH": _hash(script),
-        "DATA": _json(document),
-    }
-    pieces = _part("replay.html").split("@@")
-    return "".join(fields[piece] if index % 2 else piece for index, piece in enumerate(pieces))
-
-
-def _part(name: str) -> str:
-    return (resources.files("dubins_traffic.viewer") / name).read_text(encoding="utf-8").strip()
-
-
-def _hash(text: str) -> str:
-    """Return the source expression of `text` for a Content-Security-Policy."""
-    return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"
-
-
-def _json(document: Any) -> str:
-    """Return JSON in ASCII that can't end the element it stands in, whatever the names are."""
-    text = json.dumps(document, ensure_ascii=True, allow_nan=False, separators=(",", ":"))
-    return text.replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
+    return render("viewer/replay.html", title=title, style=style, script=script, document=document)
 
 
 def _document(

@@ -13,7 +13,6 @@ import numpy as np
 
 from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
-from dubins_traffic.campaign.report.metrics import FAULTS, WALL_METRICS
 from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import BY_CONTROLLER
@@ -24,6 +23,20 @@ from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, Ruling
 
 CONFIGURATION = "configuration"
+WALL_METRICS = (
+    Column("time_to_begin_s", "time to begin, wall clock", "s", -1),
+    Column("act_mean_s", "time to act, mean, wall clock", "s", -1),
+    Column("act_p99_s", "time to act, 99 %, wall clock", "s", -1),
+    Column("act_max_s", "time to act, longest, wall clock", "s", -1),
+)
+"""What was measured on a wall clock."""
+
+FAULTS: Mapping[str, str] = {
+    "collisions_ego_fault": "the ego",
+    "collisions_other_fault": "the other",
+    "collisions_both_fault": "both",
+}
+"""Collisions of the ego by who was at fault."""
 HELD: tuple[str, ...] = get_args(Status)
 """What can hold of a formula of the user's own."""
 
@@ -71,6 +84,20 @@ class Difference:
     estimate: Estimate
     larger: int
     smaller: int
+
+    @property
+    def is_decided(self) -> bool:
+        """Whether the interval of the mean leaves out 0."""
+        ends = self.estimate.mean_interval
+        return ends is not None and (ends[0] > 0 or ends[1] < 0)
+
+    @property
+    def better(self) -> str | None:
+        """The controller that is better in the metric, if the difference is decided."""
+        mean, better = self.estimate.mean, self.metric.better
+        if mean is None or not better or not self.is_decided:
+            return None
+        return self.first if (mean > 0) == (better > 0) else self.second
 
 
 @dataclass(frozen=True, slots=True)
@@ -270,3 +297,13 @@ def _floats(column: Any) -> Floats:
 
 def _mask(own: Any) -> Any:
     return rows.arrow().array(own)
+
+
+def shown(value: float | None) -> str:
+    """Return a number as people read it: four digits that count."""
+    return "\N{EN DASH}" if value is None else f"{value:.4g}"
+
+
+def words(name: str) -> str:
+    """Return the name of a factor or of an end as people write it."""
+    return name.replace("e_agent", "e-agent").replace("_", " ")

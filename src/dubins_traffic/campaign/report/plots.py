@@ -9,8 +9,7 @@ from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
-from dubins_traffic.campaign.report.comparison import Comparison, Level
-from dubins_traffic.campaign.report.metrics import words
+from dubins_traffic.campaign.report.comparison import Comparison, Level, words
 from dubins_traffic.errors import MissingExtraError
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.viewer import palette

@@ -1,4 +1,11 @@
-"""The statistics of a report: means and medians with bootstrap intervals, paired differences, shares."""
+"""Means, medians, shares and probabilities with their 95 % intervals.
+
+Means with their bootstrap intervals, and shares with Wilson's, need no SciPy: a service ranks by these alone. Quantiles
+of other distributions than the normal one are SciPy's.
+
+Sources: E. Wilson, Journal of the American Statistical Association 22, 1927; C. Clopper and E. Pearson, Biometrika 26,
+1934; B. Efron, Annals of Statistics 7, 1979; E. Korn and B. Graubard, Survey Methodology 24, 1998.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +28,7 @@ NORMAL = 1.959963984540054
 """The normal distribution has `LEVEL` of its weight within so many standard deviations of its mean."""
 MOST = 2_000
 """Of more values than these the interval follows from the normal and the binomial distribution."""
+MOST_WORTH = 1e9
 
 Interval: TypeAlias = tuple[float, float]
 
@@ -49,8 +57,8 @@ class Share:
 def estimate(values: Floats, *, median: bool = True) -> Estimate:
     """Return the estimates for values, NaN among them left out; without `median` of the mean alone.
 
-    The intervals are percentiles of 1,000 bootstrap resamples from a fixed seed (B. Efron, Annals of Statistics 7,
-    1979); beyond `MOST` values that of the mean is its normal one, and the median lies between order statistics.
+    The intervals are percentiles of 1,000 bootstrap resamples from a fixed seed; beyond `MOST` values that of the mean
+    is its normal one, and the median lies between order statistics.
     """
     known = values[~np.isnan(values)]
     count = len(known)
@@ -71,28 +79,60 @@ def estimate(values: Floats, *, median: bool = True) -> Estimate:
 
 def share(count: int, total: int) -> Share:
     """Return a share of trials."""
-    if not total:
-        return Share(count, total, None, None)
+    return (
+        Share(count, total, count / total, wilson(count, total)) if total else Share(count, total, None, None)
+    )
+
+
+def wilson(count: int, total: int) -> Interval:
+    """Return Wilson's 95 % interval of a probability: an event happened in `count` of `total` trials, at least one."""
     part, square = count / total, NORMAL**2
     around = 2.0 * (total + square)
     middle = (2.0 * total * part + square) / around
     half = NORMAL / around * math.sqrt(4.0 * total * part * (1.0 - part) + square)
-    low = 0.0 if count == 0 else middle - half
-    return Share(count, total, part, (low, 1.0 if count == total else middle + half))
+    return (0.0 if count == 0 else middle - half, 1.0 if count == total else middle + half)
 
 
-def stats() -> Any:
-    """Return scipy.stats, which medians of very many values need.
+def clopper_pearson(count: float, total: float) -> Interval:
+    """Return the exact 95 % interval, which holds the probability in at least 95 of 100 cases."""
+    beta, tail = distributions("an estimate of a probability", "falsify").beta, (1.0 - LEVEL) / 2.0
+    low = 0.0 if count == 0 else float(beta.ppf(tail, count, total - count + 1))
+    return low, 1.0 if count == total else float(beta.ppf(1.0 - tail, count + 1, total - count))
 
-    Raises
-    ------
-    MissingExtraError
-        Without the extra `campaign`.
+
+def korn_graubard(values: Sequence[float]) -> Interval:
+    """Return the 95 % interval of a probability from independent estimates of it without bias, at least two.
+
+    It is Clopper and Pearson's for as many trials of Monte Carlo as would vary as much as the mean (`worth`), fewer
+    where the spread itself is known from few estimates: so it is as skew as a count of few, unlike Student's.
     """
+    mean = math.fsum(values) / len(values)
+    if mean <= 0.0 or mean >= 1.0:
+        return (0.0, 1.0)
+    student = distributions("an estimate of a probability", "falsify").t.ppf(
+        0.5 + 0.5 * LEVEL, len(values) - 1
+    )
+    total = worth(values) * (NORMAL / float(student)) ** 2
+    return clopper_pearson(mean * total, total)
+
+
+def worth(values: Sequence[float]) -> float:
+    """Return how many trials of Monte Carlo would vary as much as the mean of independent estimates of a probability.
+
+    The mean must be above 0; at least two estimates. They are `MOST_WORTH` at most.
+    """
+    count = len(values)
+    mean = math.fsum(values) / count
+    variance = math.fsum((value - mean) ** 2 for value in values) / (count - 1) / count
+    return min(MOST_WORTH, mean * (1.0 - mean) / variance) if variance > 0.0 else MOST_WORTH
+
+
+def distributions(feature: str = "a report", extra: str = "campaign") -> Any:
+    """Return scipy.stats; MissingExtraError names what needs it, and the extra that brings it."""
     try:
         return import_module("scipy.stats")
     except ImportError as error:
-        raise MissingExtraError("a report", "campaign") from error
+        raise MissingExtraError(feature, extra) from error
 
 
 @lru_cache(maxsize=4)
@@ -127,5 +167,5 @@ def _normal(values: Floats, mean: float) -> Interval:
 def _ranks(values: Floats) -> Interval:
     """Return the order statistics between which the median lies: their ranks are quantiles of a binomial."""
     ordered = np.sort(values)
-    ranks: Any = stats().binom.ppf([0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], len(values), 0.5)
+    ranks: Any = distributions().binom.ppf([0.5 - 0.5 * LEVEL, 0.5 + 0.5 * LEVEL], len(values), 0.5)
     return float(ordered[int(ranks[0])]), float(ordered[int(ranks[1])])

@@ -6,10 +6,8 @@ import shlex
 from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from dubins_traffic.campaign.report.comparison import Comparison
-from dubins_traffic.campaign.report.metrics import shown, words
+from dubins_traffic.campaign.report.comparison import Comparison, shown, words
 from dubins_traffic.campaign.report.statistics import Interval, Share
-from dubins_traffic.campaign.table import FACTOR
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -30,12 +28,9 @@ def worst_lines(worst: Mapping[str, Sequence[Bad]], folder: str) -> Iterator[str
     for controller, trials in worst.items():
         for bad in trials:
             row = bad.row
-            factors = [
-                f"{words(name.removeprefix(FACTOR))} {value}"
-                for name, value in row.items()
-                if name.startswith(FACTOR)
-            ]
-            place = ", ".join([row["configuration"], *factors, f"trial {row['trial']} of seed {row['seed']}"])
+            place = ", ".join(
+                [row["configuration"], *bad.factors, f"trial {row['trial']} of seed {row['seed']}"]
+            )
             note = f" ({bad.note})" if bad.note else ""
             yield f"{controller}, {place}: {bad.why}{note}"
             yield f"    dubins-traffic campaign replay {shlex.quote(folder)} {row['number']}"
@@ -59,11 +54,10 @@ def _differences(comparison: Comparison) -> Table:
     table = _table("differences on the same instances; in bold those whose interval leaves out 0")
     _columns(table, ("metric", "controllers"), ("mean", "95 %", "more", "less"))
     for one in comparison.differences:
-        interval = one.estimate.mean_interval
-        decided = interval is not None and (interval[0] > 0 or interval[1] < 0)
-        numbers = (shown(one.estimate.mean), _interval(interval), str(one.larger), str(one.smaller))
+        interval = _interval(one.estimate.mean_interval)
+        numbers = (shown(one.estimate.mean), interval, str(one.larger), str(one.smaller))
         pair = f"{one.first} - {one.second}"
-        table.add_row(one.metric.heading, pair, *numbers, style="bold" if decided else "")
+        table.add_row(one.metric.heading, pair, *numbers, style="bold" if one.is_decided else "")
     return table
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.report.metrics import words
-from dubins_traffic.campaign.table import places
+from dubins_traffic.campaign.report.comparison import words
+from dubins_traffic.campaign.table import FACTOR, places
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.record import reader
@@ -53,6 +53,14 @@ class Bad:
     why: str
     replay: str | None
     note: str
+
+    @property
+    def factors(self) -> list[str]:
+        """What varied, with its values, in words."""
+        own = {
+            name.removeprefix(FACTOR): value for name, value in self.row.items() if name.startswith(FACTOR)
+        }
+        return [f"{words(name)} {value}" for name, value in own.items()]
 
 
 def order(results: Any) -> Ints:

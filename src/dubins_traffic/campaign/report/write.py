@@ -1,9 +1,11 @@
-"""Writing the report of a campaign."""
+"""Writing the report of a campaign: its page, its numbers as CSV, and the replays of its worst trials."""
 
 from __future__ import annotations
 
+import csv
+import io
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,16 +14,17 @@ from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import manifest, rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.comparison import Comparison, compare
-from dubins_traffic.campaign.report.csv_tables import csv_files
 from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.plots import figures
-from dubins_traffic.campaign.report.statistics import stats
+from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share, distributions, share
 from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, require_output, write_text
-from dubins_traffic.viewer.replay import PAGES
+from dubins_traffic.viewer.pages import PAGES
 
+ESTIMATE = ("count", "mean", "mean_low", "mean_high", "median", "median_low", "median_high")
+SHARE = ("count", "of", "share", "low", "high")
 REPORT = "report"
 PAGE = "index.html"
 
@@ -72,7 +75,7 @@ def write_report(
     """
     rows.arrow()
     figures()
-    stats()
+    distributions()
     place = Path(folder)
     known, campaign, parts = _open(place)
     results = table.read(place, campaign, parts)
@@ -157,3 +160,74 @@ def _open(place: Path) -> tuple[Mapping[str, Any], Campaign, Sequence[Path]]:
 
 def _silent(_done: int, _total: int) -> None:
     """Tell nobody."""
+
+
+def csv_files(comparison: Comparison) -> dict[str, str]:
+    """Return the files by name; floats read back to the same bits, 95 % intervals as low and high."""
+    return {
+        "controllers.csv": _csv_text(("controller", "metric", *ESTIMATE), _controllers(comparison)),
+        "shares.csv": _csv_text(("controller", "of_what", "which", *SHARE), _shares(comparison)),
+        "differences.csv": _csv_text(
+            ("first", "second", "metric", *ESTIMATE, "first_larger", "first_smaller"),
+            _differences(comparison),
+        ),
+        "factors.csv": _csv_text(
+            ("factor", "value", "controller", "metric", *ESTIMATE[:4]), _factors(comparison)
+        ),
+    }
+
+
+def _controllers(comparison: Comparison) -> Iterator[Sequence[object]]:
+    for standing in comparison.standings:
+        for metric in comparison.metrics:
+            yield standing.controller, metric.name, *_estimate(standing.estimates[metric.name])
+
+
+def _shares(comparison: Comparison) -> Iterator[Sequence[object]]:
+    for standing in comparison.standings:
+        groups = {
+            "clean": {"clean": standing.clean} if standing.judged else {},
+            "verdict": standing.verdicts,
+            "excused": {"near": standing.near} if standing.near.total else {},
+            "cut": {"cut": share(standing.cut, standing.judged)} if standing.cut else {},
+            "end": standing.ends,
+            "rule broken by the ego": standing.broken,
+            "assumption broken by others": standing.fallen,
+            **{f"formula {name}": found for name, found in standing.formulas.items()},
+        }
+        for what, group in groups.items():
+            for which, part in group.items():
+                yield standing.controller, what, which, *_share(part)
+
+
+def _differences(comparison: Comparison) -> Iterator[Sequence[object]]:
+    for one in comparison.differences:
+        estimate = _estimate(one.estimate)
+        yield one.first, one.second, one.metric.name, *estimate, one.larger, one.smaller
+
+
+def _factors(comparison: Comparison) -> Iterator[Sequence[object]]:
+    for level in comparison.levels:
+        estimate = _estimate(level.estimate)[:4]
+        yield level.factor, level.value, level.controller, level.metric.name, *estimate
+
+
+def _estimate(estimate: Estimate) -> tuple[object, ...]:
+    mean, median = estimate.mean_interval, estimate.median_interval
+    return estimate.count, estimate.mean, *_ends(mean), estimate.median, *_ends(median)
+
+
+def _share(share: Share) -> tuple[object, ...]:
+    return share.count, share.total, share.share, *_ends(share.interval)
+
+
+def _ends(interval: Interval | None) -> tuple[object, object]:
+    return interval or (None, None)
+
+
+def _csv_text(headings: Sequence[str], rows: Iterator[Sequence[object]]) -> str:
+    stream = io.StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(headings)
+    writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
+    return stream.getvalue()

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import structlog
-from jinja2 import Environment, PackageLoader, select_autoescape
+from jinja2 import Undefined
 from litestar import Litestar, MediaType, Request, Response
 from litestar.config.csrf import CSRFConfig
 from litestar.di import Provide
@@ -32,9 +32,10 @@ from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import api, doors, login, metrics, organisers, pages, submitting, team
 from dubins_traffic.service.web.bodies import Bodies
-from dubins_traffic.service.web.said import moment
+from dubins_traffic.service.web.said import TEMPLATES, moment
 from dubins_traffic.service.web.sessions import SessionConfig, SessionFiles
 from dubins_traffic.service.web.viewer import PROGRAMS, Recognition, Viewer
+from dubins_traffic.viewer.pages import environment
 
 log = structlog.get_logger("dubins_traffic.service")
 POLICY = (
@@ -120,11 +121,9 @@ def _middleware(settings: Settings, largest: int) -> list[Any]:
 
 
 def _templates() -> JinjaTemplateEngine:
-    environment = Environment(
-        loader=PackageLoader("dubins_traffic.service.web"), autoescape=select_autoescape(default=True)
-    )
-    environment.filters |= {"moment": moment}  # pyright: ignore[reportUnknownMemberType]
-    return JinjaTemplateEngine.from_environment(environment)
+    made = environment().overlay(undefined=Undefined)  # forms are shown before and after they are filled in
+    made.filters["moment"] = moment  # pyright: ignore[reportUnknownMemberType]
+    return JinjaTemplateEngine.from_environment(made)
 
 
 def _state(office: Office) -> Any:
@@ -183,7 +182,7 @@ def _answer_to(request: Request[Any, Any, Any], error: Exception) -> Response[An
     viewer = request.scope["user"] if "user" in request.scope else Viewer()
     office: Office = request.app.state["office"]
     return Template(
-        "error.html",
+        f"{TEMPLATES}/error.html",
         context={
             "viewer": viewer,
             "site": office.settings.name,

@@ -14,6 +14,7 @@ from litestar.status_codes import HTTP_200_OK, HTTP_204_NO_CONTENT
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
+from dubins_traffic.competition.judging import Owner
 from dubins_traffic.service import housekeeping, queue, submissions
 from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.office import Office
@@ -70,7 +71,7 @@ class Result(msgspec.Struct, forbid_unknown_fields=True):
     number: Whole
     row: dict[str, Any]
     end: Annotated[str, msgspec.Meta(max_length=40)]
-    owner: Annotated[str, msgspec.Meta(max_length=20)] | None
+    owner: Owner | None
     log: LongText
     frames: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None
     replay: Annotated[str, msgspec.Meta(pattern="^[0-9a-f]{64}$")] | None

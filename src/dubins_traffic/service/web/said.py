@@ -11,12 +11,13 @@ from dubins_traffic.service.office import Office
 from dubins_traffic.service.web.viewer import Viewer
 
 Form = dict[str, str]
+TEMPLATES = "service/web/templates"
 
 
 def page(office: Office, viewer: Viewer, template: str, title: str, /, **given: Any) -> Template:
     """Return a page by its template."""
     context = {"viewer": viewer, "site": office.settings.name, "title": title, "now": office.clock(), **given}
-    return Template(f"{template}.html", context=context)
+    return Template(f"{TEMPLATES}/{template}.html", context=context)
 
 
 def moment(at: float | None) -> str:

@@ -1,4 +1,4 @@
-"""A campaign's chunks on a Ray cluster (optional extra ``ray``).
+"""A crew on a Ray cluster (optional extra ``ray``).
 
 Ray is driven by a process of its own (`ray_driver`): where it loses its head node for good, Ray ends the process that
 drives it. This side sees that process fall silent, and says what has happened.
@@ -12,15 +12,13 @@ import socket
 import time
 from collections.abc import Sequence
 from importlib.util import find_spec
-from typing import Generic
 
-from dubins_traffic.campaign import ray_driver
-from dubins_traffic.campaign.engines import Outcome, Work
-from dubins_traffic.campaign.worker import Surroundings
 from dubins_traffic.errors import ClusterLostError, DubinsTrafficError, InputError, MissingExtraError
-from dubins_traffic.runs.jobs import deaf_to_interrupts
+from dubins_traffic.runs import ray_driver
+from dubins_traffic.runs.crew import Crew, Errand, Outcome, Processes, search_path
+from dubins_traffic.runs.processes import deaf_to_interrupts
+from dubins_traffic.runs.ray_driver import LOCAL
 
-LOCAL = "local"
 SILENCE = 20.0
 """Seconds without a sign of life after which a cluster is lost."""
 START = 90.0
@@ -29,17 +27,15 @@ EMPTY = 300.0
 """Seconds for which a cluster may be without a single processor."""
 
 
-class RayEngine(Generic[Work]):
-    """An engine of all processors of a Ray cluster.
+class RayCrew:
+    """A crew of all processors of a Ray cluster.
 
     Parameters
     ----------
     address : str
-        ``local``: a cluster of this machine that ends with the engine; ``auto``, ``host:port`` or ``ray://host:port``.
+        ``local``: a cluster of this machine that ends with the crew; ``auto``, ``host:port`` or ``ray://host:port``.
     workers : int
         Processors of a local cluster.
-    around : Surroundings
-        What workers share.
 
     Raises
     ------
@@ -47,14 +43,14 @@ class RayEngine(Generic[Work]):
         If the cluster can't be joined.
     """
 
-    def __init__(self, address: str, workers: int, around: Surroundings) -> None:
+    def __init__(self, address: str, workers: int) -> None:
         self._address = address
-        self._under_way: dict[int, Work] = {}
+        self._under_way: dict[int, Errand] = {}
         self._processors = 0
         context = multiprocessing.get_context("spawn")
         self._pipe, theirs = context.Pipe()
         self._process = context.Process(
-            target=ray_driver.drive, args=(theirs, address, workers, pickle.dumps(around)), daemon=False
+            target=ray_driver.drive, args=(theirs, address, workers, search_path()), daemon=False
         )
         with deaf_to_interrupts():
             self._process.start()
@@ -69,19 +65,19 @@ class RayEngine(Generic[Work]):
 
     @property
     def capacity(self) -> int:
-        """One chunk in work and one in waiting for each processor of the cluster."""
+        """One errand in work and one in waiting for each processor of the cluster."""
         return 2 * max(1, self._processors)
 
-    def submit(self, chunk: Work) -> None:
-        """Take a chunk to run."""
-        self._under_way[chunk.number] = chunk
+    def submit(self, errand: Errand) -> None:
+        """Take an errand to run."""
+        self._under_way[errand.number] = errand
         try:
-            self._pipe.send((chunk.number, pickle.dumps(chunk)))
+            self._pipe.send((errand.number, pickle.dumps(errand)))
         except OSError:
             raise self._lost("its driver ended") from None
 
-    def wait(self) -> Sequence[Outcome[Work]]:
-        """Return what has become of chunks.
+    def wait(self) -> Sequence[Outcome]:
+        """Return what has become of errands.
 
         Raises
         ------
@@ -101,8 +97,8 @@ class RayEngine(Generic[Work]):
             self._process.kill()
             self._process.join()
 
-    def _take(self, patience: float) -> Outcome[Work] | None:
-        """Take one message of the driver: a chunk's outcome, or a sign of life."""
+    def _take(self, patience: float) -> Outcome | None:
+        """Take one message of the driver: an errand's outcome, or a sign of life."""
         try:
             if not self._pipe.poll(max(0.0, self._heard + patience - time.monotonic())):
                 raise self._lost(f"no sign of life for {patience:g} s")
@@ -117,8 +113,8 @@ class RayEngine(Generic[Work]):
             return None
         return self._outcome(*rest)
 
-    def _outcome(self, number: int, part: bytes | None) -> Outcome[Work]:
-        return Outcome(self._under_way.pop(number), part)
+    def _outcome(self, number: int, found: bytes | None) -> Outcome:
+        return Outcome(self._under_way.pop(number), None if found is None else pickle.loads(found))
 
     def _count(self, processors: int) -> None:
         self._processors = processors
@@ -154,3 +150,8 @@ def check_address(address: str) -> None:
     except OSError as error:
         problem = f"no Ray cluster there ({error.strerror or error})"
         raise InputError(problem, file="--ray", value=address, expected=expected) from None
+
+
+def crew_at(ray: str | None, workers: int) -> Crew:
+    """Return so many processes of this machine, or a crew on the Ray cluster at an address; errors as `RayCrew`."""
+    return Processes(workers) if ray is None else RayCrew(ray, workers)

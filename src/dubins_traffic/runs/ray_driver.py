@@ -1,13 +1,15 @@
-"""The process that runs a campaign's chunks on Ray: takes chunks from a pipe, sends their parts back.
+"""The process that runs errands on Ray: takes them from a pipe, sends back what came of them.
 
-It handles chunks as bytes and imports none of the modules that run trials, so that it joins a cluster sooner.
+It handles them as bytes and imports none of the modules that run trials, so that it joins a cluster sooner.
 """
 
 from __future__ import annotations
 
 import contextlib
 import os
+import pickle
 import queue
+import sys
 import threading
 from concurrent.futures import Future
 from functools import partial
@@ -16,35 +18,35 @@ from importlib.metadata import version
 from multiprocessing.connection import Connection
 from typing import Any, TypeAlias
 
-from dubins_traffic.campaign import ray_task
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.runs.parent_watch import prepare_worker
+from dubins_traffic.runs.processes import prepare_worker
 
+LOCAL = "local"
 ALIVE, DONE, FAILED = "alive", "done", "failed"
-"""Kinds of messages: (alive, processors of the cluster), (done, number, part or None if lost), (failed, why)."""
+"""Kinds of messages: (alive, processors of the cluster), (done, number, result or None if lost), (failed, why)."""
 PULSE = 1.0
 """Seconds between signs of life."""
 
 _Event: TypeAlias = tuple[int, bytes | Future[bytes]] | None
-"""A chunk that has come, or one that is done, by its number; None: the pipe is closed."""
+"""An errand that has come, or one that is done, by its number; None: the pipe is closed."""
+PACKAGE = "dubins-traffic"
 
 
-def drive(pipe: Connection, address: str, workers: int, around: bytes) -> None:
-    """Join the cluster at `address` and run chunks until the pipe is closed at the other end.
+def drive(pipe: Connection, address: str, workers: int, paths: tuple[str, ...]) -> None:
+    """Join the cluster at `address` and run errands until the pipe is closed at the other end.
 
     Parameters
     ----------
     pipe : Connection
-        Chunks come from it as (number, the chunk pickled); messages go into it.
+        Errands come from it as (number, the errand pickled); messages go into it.
     address : str
-        As of `RayEngine`.
+        As of `RayCrew`.
     workers : int
         Processors of a local cluster.
-    around : bytes
-        What workers share, pickled.
+    paths : tuple of str
+        Where workers look modules up.
     """
     prepare_worker()
-    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     # Ray's own words, pages of them when a node is lost, stand in its logs; ours go through the pipe.
     nowhere = os.open(os.devnull, os.O_WRONLY)
     for output in (1, 2):
@@ -54,9 +56,9 @@ def drive(pipe: Connection, address: str, workers: int, around: bytes) -> None:
     over = threading.Event()
     beat = threading.Thread(target=_beat, args=(ray, send, over), daemon=True)
     try:
-        _join(ray, address, workers)
+        join(ray, address, workers)
         beat.start()
-        _Driver(ray, pipe, send, around).run()
+        _Driver(ray, pipe, send, paths).run()
     except (BrokenPipeError, EOFError):
         pass  # the other end of the pipe has gone
     except Exception as error:
@@ -68,15 +70,15 @@ def drive(pipe: Connection, address: str, workers: int, around: bytes) -> None:
         ray.shutdown()
 
 
-def _join(ray: Any, address: str, workers: int) -> None:
+def join(ray: Any, address: str, workers: int | None) -> None:
+    """Join the cluster at an address; ``local``: begin one of so many processors."""
+    os.environ["RAY_USAGE_STATS_ENABLED"] = "0"
     quiet: dict[str, Any] = {"log_to_driver": False, "logging_level": "ERROR"}
-    if address == "local":
-        os.environ.setdefault(
-            "RAY_worker_niceness", "0"
-        )  # as processes of the pool; 15 is meant for shared machines
-        ray.init(address="local", num_cpus=workers, include_dashboard=False, **quiet)
-    else:
-        ray.init(address=address, **quiet)
+    if address == LOCAL:
+        # as processes of this machine; 15 is meant for shared machines
+        os.environ.setdefault("RAY_worker_niceness", "0")
+        quiet |= {"num_cpus": workers, "include_dashboard": False}
+    ray.init(address=address, **quiet)
 
 
 class _Sender:
@@ -102,32 +104,32 @@ def _beat(ray: Any, send: _Sender, over: threading.Event) -> None:
 
 
 class _Driver:
-    """Hands chunks over as they come, and their parts back as they are done."""
+    """Hands errands over as they come, and what came of them back as they are done."""
 
-    def __init__(self, ray: Any, pipe: Connection, send: _Sender, around: bytes) -> None:
+    def __init__(self, ray: Any, pipe: Connection, send: _Sender, paths: tuple[str, ...]) -> None:
         self._errors = ray.exceptions
         self._send = send
-        self._around = ray.put(around)
-        self._task = ray.remote(num_cpus=1, max_retries=0)(ray_task.run)
-        self._version = version(ray_task.PACKAGE)
+        self._paths = ray.put(paths)
+        self._task = ray.remote(num_cpus=1, max_retries=0)(run)
+        self._version = version(PACKAGE)
         self._events: queue.SimpleQueue[_Event] = queue.SimpleQueue()
         threading.Thread(target=self._listen, args=(pipe,), daemon=True).start()
 
     def run(self) -> None:
-        """Run chunks until the other end of the pipe is closed."""
+        """Run errands until the other end of the pipe is closed."""
         while (event := self._events.get()) is not None:
             number, what = event
             if isinstance(what, bytes):
-                future: Future[bytes] = self._task.remote(what, self._around, self._version).future()
+                future: Future[bytes] = self._task.remote(what, self._paths, self._version).future()
                 future.add_done_callback(partial(self._note, number))
             else:
-                self._send(DONE, number, self._part(what))
+                self._send(DONE, number, self._result(what))
 
     def _note(self, number: int, done: Future[bytes]) -> None:
         self._events.put((number, done))
 
-    def _part(self, done: Future[bytes]) -> bytes | None:
-        """Return the part of a chunk, None if it was lost with a worker or a node.
+    def _result(self, done: Future[bytes]) -> bytes | None:
+        """Return what came of an errand, None if it was lost with a worker or a node.
 
         Raises
         ------
@@ -147,3 +149,21 @@ class _Driver:
                 self._events.put(pipe.recv())
         except (EOFError, OSError):
             self._events.put(None)
+
+
+def run(errand: bytes, paths: tuple[str, ...], wanted: str) -> bytes:
+    """Run an errand in a worker of the cluster; both it and what comes of it are pickled.
+
+    The process that drives Ray names this task and hands errands on as they came, so that it need not load what runs
+    them.
+
+    Raises
+    ------
+    DubinsTrafficError
+        If this node has another version of the package than the one that is wanted.
+    """
+    own = version(PACKAGE)
+    if own != wanted:
+        raise DubinsTrafficError(f"a node has {PACKAGE} {own}, not {wanted}")
+    sys.path += [path for path in paths if path not in sys.path]
+    return pickle.dumps(pickle.loads(errand).run(lambda: False))
