@@ -41,6 +41,9 @@ from dubins_traffic.transports.lcm.transport import Lcm
 from dubins_traffic.transports.link import Link
 from tests.conformance.transport import UntypedConformance, frames, slalom
 from tests.recordings import make_instance
+from tests.tools import need
+
+pytestmark = pytest.mark.tools
 
 ROOT = Path(__file__).resolve().parents[2]
 KEPT = ExitStack()
@@ -222,9 +225,9 @@ def without_network(code: str, before: str = "true") -> str:
     try:
         done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=600)
     except FileNotFoundError:
-        pytest.skip("unshare is not here")
-    if "unshare" in done.stderr:
-        pytest.skip("no namespaces of one's own are allowed here")
+        need("unshare", "util-linux has it")
+        raise
+    need("namespaces of one's own" if "unshare" in done.stderr else "", "the system has to allow them")
     return done.stdout + done.stderr
 
 

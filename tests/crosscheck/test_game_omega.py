@@ -17,6 +17,8 @@ from dubins_traffic.synthesis.solver import solve
 from tests.games import ALL, board, pan
 from tests.tools import Solvers, solvers
 
+pytestmark = pytest.mark.tools
+
 SCRIPT = Path(__file__).with_name("omega_game.py")
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
 

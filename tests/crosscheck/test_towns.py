@@ -21,6 +21,8 @@ from tests.minute import a_minute
 from tests.room import lacking
 from tests.tools import interpreter_with, sumo_program
 
+pytestmark = pytest.mark.tools
+
 TOWNS = {"DRT": 16_000.0, "bs3d": 5_600.0}
 """Towns of `benchmarks.towns`, and the least metres with one lane in each direction in them."""
 LEAST = 0.85

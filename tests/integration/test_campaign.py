@@ -19,6 +19,7 @@ import pytest
 from pyarrow import parquet
 
 from tests.campaigns import campaign, command, logged, run, succeed, written
+from tests.tools import need
 
 TRIALS = 2 * 4 * 8
 
@@ -147,12 +148,13 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     place = tmp_path / "disk"
     place.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)]
-    if os.geteuid() != 0 or subprocess.run(mount, check=False, capture_output=True).returncode != 0:
-        pytest.skip("needs the right to mount a file system")
+    refused = os.geteuid() != 0 or subprocess.run(mount, check=False, capture_output=True).returncode
+    need("the right to mount" if refused else "", "it takes root, on a machine that allows mounts")
     yield place
     subprocess.run(["umount", str(place)], check=True)
 
 
+@pytest.mark.tools
 def test_a_full_disk_keeps_what_is_finished(tmp_path: Path, small_disk: Path, table: bytes) -> None:
     file, out = written(tmp_path, campaign()), small_disk / "out"
     done = run(file, out, "--workers", "2")

@@ -274,6 +274,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
 
 
 @needs_boxes
+@pytest.mark.tools
 def test_the_templates_pass_as_they_are_and_drive_alike(tmp_path: Path) -> None:
     need_compiler()
     write_template("python", tmp_path / "python")

@@ -135,7 +135,10 @@ def test_a_document_of_a_page_can_be_read(block: Block) -> None:
         assert len(ElementTree.fromstring(block.code))
 
 
-@pytest.mark.parametrize("name", sorted(PAGES))
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.tools) if PAGES[name].needs else name for name in sorted(PAGES)],
+)
 def test_the_code_of_a_page_runs(name: str, tmp_path: Path) -> None:
     page = PAGES[name]
     for need in page.needs:

@@ -17,6 +17,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.record.reader import read
 from dubins_traffic.runs.single import run_trial
+from tests.tools import need_module
 
 COMMAND = [sys.executable, "-m", "dubins_traffic.cli"]
 CONFIG: dict[str, Any] = {
@@ -415,10 +416,13 @@ configurations = ["small.json"]
 """
 
 
-@pytest.mark.parametrize("engine", [["--workers", "1"], ["--ray", "local", "--workers", "1"]])
+@pytest.mark.parametrize(
+    "engine",
+    [["--workers", "1"], pytest.param(["--ray", "local", "--workers", "1"], marks=pytest.mark.tools)],
+)
 def test_a_campaign_goes_on_where_controllers_exit(engine, place):
     if engine[0] == "--ray":
-        pytest.importorskip("ray")
+        need_module("ray")
     pyarrow = pytest.importorskip("pyarrow.parquet")
     (place / "c.toml").write_text(CAMPAIGN)
     done = outside("campaign", "run", "c.toml", "-o", "out", *engine)

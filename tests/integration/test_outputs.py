@@ -101,6 +101,7 @@ def test_a_command_replaces_nothing_that_it_was_not_told_to(
 
 
 @pytest.mark.parametrize("form", [[], ["--cpp"]])
+@pytest.mark.tools
 def test_messages_for_ros_replace_nothing_unasked(
     form: list[str], place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

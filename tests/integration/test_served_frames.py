@@ -21,6 +21,8 @@ from dubins_traffic.service.client import packed
 from tests.ros import need_compiler
 from tests.services import COMMAND, Person, Service, serving, wait_until
 
+pytestmark = pytest.mark.tools("boxes")
+
 TRIALS = int(os.environ.get("DUBINS_TRAFFIC_SERVED_TRIALS", "12"))
 LONGEST_S = 600.0 + 60.0 * TRIALS
 FINAL = ("done", "rejected", "failed", "cancelled")

@@ -8,6 +8,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import pytest
+
 from tests.integration.test_readme import ROOT
 from tests.integration.test_tutorials import follow
 from tests.tools import interpreter_with
@@ -56,6 +58,7 @@ def test_the_first_page_leads_there() -> None:
     assert "python examples/foreign_synthesis.py --tulip " in last
 
 
+@pytest.mark.tools
 def test_the_path_of_a_stranger(tmp_path: Path) -> None:
     around = installed(tmp_path)
     for name in STEPS:
