@@ -63,7 +63,6 @@ def test_hosted_ci_runs_what_ci_runs_here() -> None:
     flow = YAML(typ="safe").load((ROOT / ".github" / "workflows" / "ci.yml").read_text(encoding="utf-8"))
     runs = [step["run"] for job in flow["jobs"].values() for step in job["steps"] if "run" in step]
     assert "bash .ci/run" in runs
-    assert "make test" in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 
 
 def _recipe(target: str) -> str:
