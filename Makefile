@@ -56,7 +56,7 @@ test-all: test test-tools ## all tests, then those of which the suite runs a par
 	DUBINS_TRAFFIC_ESTIMATES=full $(BIN)/python -m pytest tests/integration/test_falsify.py \
 		tests/integration/test_falsify_targets.py tests/integration/test_splitting.py \
 		-k "splitting or million or guides"
-	$(BIN)/python -m benchmarks verify odd_egos rules towns
+	$(BIN)/python -m experiments verify odd_egos rules towns
 
 golden: .venv/.installed-dev ## compare what trials, batches, campaigns and games give with tests/golden/hashes.json
 	$(BIN)/python -m tests.golden.hashes
@@ -80,12 +80,12 @@ format: .venv/.installed-dev ## format the sources and mend what the linter can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: .venv/.installed-dev ## speed, as ratios to named peers and limits measured in the same run
+bench: .venv/.installed-dev ## speed, as ratios to limits measured in the same run: ten minutes
 	@$(BIN)/python -m benchmarks
 
 clean: ## remove .venv, the demo's output and everything that tools leave behind
 	rm -rf .venv demo-output out build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache
-	find src tests benchmarks examples -name __pycache__ -prune -exec rm -rf {} +
+	find src tests benchmarks experiments examples -name __pycache__ -prune -exec rm -rf {} +
 	rm -rf src/dubins_traffic.egg-info
 
 .venv/.installed-plot: $(SETUP)

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import platform
 from collections.abc import Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,6 +18,16 @@ class Row:
     figure: str
     bar: str
     met: bool
+
+
+def machine() -> str:
+    """Return a sentence about processor and versions."""
+    cpuinfo = Path("/proc/cpuinfo")
+    lines = cpuinfo.read_text().splitlines() if cpuinfo.is_file() else []
+    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
+    kind = names[0] if names else platform.machine()
+    parts = [f"{name} {version(name)}" for name in ("numpy", "numba")]
+    return f"{os.cpu_count()} cores of {kind}, Python {platform.python_version()}, {', '.join(parts)}."
 
 
 def show(title: str, rows: Sequence[Row]) -> bool:

@@ -188,7 +188,7 @@ PAGES: dict[str, Page] = {
     "task.md": Page(there=(clone("docs/pictures"),)),
     "theory.md": Page(
         there=(
-            clone("examples/solve_game.py", "benchmarks", "tests"),
+            clone("examples/solve_game.py", "benchmarks", "experiments", "tests"),
             files(**{"my-instance__json": dumps(SQUARE)}),
         ),
     ),

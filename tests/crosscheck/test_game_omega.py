@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.synthesis import request
+from experiments.synthesis import request
 
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks.synthesized import Events, instance
+from experiments.synthesized import Events, instance
 
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.controllers.synthesized import STRATEGY_LEFT, Synthesized

@@ -1,7 +1,7 @@
-"""A sample of `benchmarks.odd_egos`, whose bar is 2,000 trials: no odd ego brings a lawful car to a breach."""
+"""A sample of `experiments.odd_egos`, whose bar is 2,000 trials: no odd ego brings a lawful car to a breach."""
 
 import pytest
-from benchmarks.odd_egos import NAMES, Oddity, kind_of, trial
+from experiments.odd_egos import NAMES, Oddity, kind_of, trial
 
 SECONDS = 60.0
 SAMPLE = tuple(range(28, 28 + len(NAMES)))

@@ -31,7 +31,7 @@ def test_the_source_distribution_holds_tests_and_documentation() -> None:
     orders = [line.split() for line in lines if line and not line.startswith("#")]
     grafted = {name for order, *names in orders if order == "graft" for name in names}
     included = {name for order, *names in orders if order == "include" for name in names}
-    assert {"docs", "tests", "examples", "benchmarks", "scripts"} <= grafted
+    assert {"docs", "tests", "examples", "benchmarks", "experiments", "scripts"} <= grafted
     assert {"README.md", "CHANGELOG.md", "LICENSE", "Makefile", "constraints.txt"} <= included
     assert all((ROOT / name).exists() for name in grafted | included)
     assert ["global-exclude", "__pycache__", "*.py[cod]", ".DS_Store"] in orders

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benchmarks.competition import ROADS, RULES, SWERVES
+from experiments.competition import ROADS, RULES, SWERVES
 
 from dubins_traffic.competition.templates import write_template
 from dubins_traffic.service.client import packed

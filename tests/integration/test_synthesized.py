@@ -1,11 +1,11 @@
-"""Strategies played on the road; `benchmarks.synthesized` shows the bars on 2,000 trials."""
+"""Strategies played on the road; `experiments.synthesized` shows the bars on 2,000 trials."""
 
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from benchmarks.synthesized import Drive, Events, drive, instance
+from experiments.synthesized import Drive, Events, drive, instance
 
 from dubins_traffic.controllers import registry
 from dubins_traffic.controllers.synthesized import STRATEGY_LEFT, Synthesized

@@ -1,4 +1,4 @@
-"""`python -m benchmarks.competition [COUNT]`: entries judged at home and as a server does, frames compared.
+"""`python -m experiments.competition [COUNT]`: entries judged at home and as a server does, frames compared.
 
 At home trials run one after the other in this process; a server's two workers take them in chunks, in another order.
 Entries drive in boxes: two in Python, one that keeps the rules, one program of its own in C++.
@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.table import Row, show
+
 from dubins_traffic.competition.boxed import boxed
 from dubins_traffic.competition.competition import Competition, Phase
 from dubins_traffic.competition.frames_hash import FramesHash

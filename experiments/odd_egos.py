@@ -1,13 +1,13 @@
 """Can an odd ego, clean as it is, bring a car that keeps the law to a breach of E1 to E6?
 
-    python -m benchmarks odd_egos
-    python -m benchmarks.odd_egos [TRIALS] [JOBS] [FIRST]
+    python -m experiments odd_egos
+    python -m experiments.odd_egos [TRIALS] [JOBS] [FIRST]
 
 Each trial is 120 s. Of two trials one is on a grid, with up to a third of its segments removed, the other on a random
 network of 6 to 24 intersections. One in three has obstacles in and beside the lanes, just behind intersections too, but
 none that bars a goal or the way to it.
 There are 1 to 7 e-agents: `lawful` ones that wander, loop or go between places; in one trial of four a `nemesis` is
-among them, and one of sixteen has a team `counter`. The kinds of `benchmarks.odd_drivers` take turns. A trial in which
+among them, and one of sixteen has a team `counter`. The kinds of `experiments.odd_drivers` take turns. A trial in which
 the ego is not clean does not count.
 """
 
@@ -21,14 +21,15 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from benchmarks.drawing import random_roads, random_trial
-from benchmarks.odd_drivers import KINDS
-from benchmarks.rules import e_agents
 from benchmarks.table import Row, show
+
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import run_trial
+from experiments.drawing import random_roads, random_trial
+from experiments.odd_drivers import KINDS
+from experiments.rules import e_agents
 
 DURATION = 120.0
 SEED = 2016

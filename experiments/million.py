@@ -1,6 +1,6 @@
 """A campaign of a million trials: how long it takes on two cores, and how much memory.
 
-    python -m benchmarks million
+    python -m experiments million
 
 1,000,000 trials of 10 s with 2 `lawful` e-agents and the `rules` ego on a grid of 4 by 5, two goals, all rules judged,
 all scores in the table. Drawing and making the table are part of the time.
@@ -15,6 +15,7 @@ from time import perf_counter
 
 from benchmarks.batch import configuration
 from benchmarks.table import Row
+
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.run_campaign import run_campaign
 
@@ -25,7 +26,7 @@ GIBIBYTES = 2.0
 
 
 def measure(trials: int = TRIALS) -> list[Row]:
-    """Return the rows of this benchmark."""
+    """Return the rows of this experiment."""
     configurations = [{"name": "million", "document": configuration(agents=2, duration=10)}]
     campaign = Campaign.from_document(
         {"version": 0, "controllers": ["rules"], "configurations": configurations, "trials": trials}

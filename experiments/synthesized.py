@@ -1,6 +1,6 @@
 """How a strategy of the game of cells does on the road: `synthesized` among `lawful` e-agents and a `nemesis`.
 
-    python -m benchmarks.synthesized [TRIALS] [JOBS] [FIRST]
+    python -m experiments.synthesized [TRIALS] [JOBS] [FIRST]
 
 Each trial is 300 s with 1 to 3 e-agents: `lawful` ones that wander or go between places, with one `nemesis` among them
 in about every other trial. Half of the trials are on the 3x4 grid, with goals at two opposite corners and strategies
@@ -22,8 +22,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from benchmarks.drawing import random_roads, random_trial
 from benchmarks.table import Row, show
+
 from dubins_traffic.controllers.synthesized import STRATEGY_LEFT, Synthesized
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
@@ -37,6 +37,7 @@ from dubins_traffic.synthesis.instance import arena_of, assumption_of
 from dubins_traffic.synthesis.road_play import NEW_TICKET, UNKNOWN_MOVE
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
+from experiments.drawing import random_roads, random_trial
 
 DURATION = 300.0
 TRIALS = 2000

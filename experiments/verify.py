@@ -1,4 +1,4 @@
-"""`python -m benchmarks.verify [COUNT]`: records of every kind of driver, world and transport, each verified.
+"""`python -m experiments.verify [COUNT]`: records of every kind of driver, world and transport, each verified.
 
 Trials differ in network, cars, obstacles, disturbances, e-agents and controller, and in what carries the commands.
 LCM, ROS 1 and ROS 2 need a network of their own: `tests/conformance` verifies the record of every trial over every
@@ -17,8 +17,9 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import Any
 
-import dubins_traffic as dt
 from benchmarks.table import Row, show
+
+import dubins_traffic as dt
 from dubins_traffic.controllers.registry import load
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.sessions.remote import hand_over

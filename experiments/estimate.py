@@ -1,7 +1,7 @@
 """How well does splitting estimate what is rare: against Monte Carlo at 1e-3, and an event of about 1e-6.
 
-    python -m benchmarks estimate
-    python -m benchmarks.estimate [RUNS] [TRIALS] [RARE_RUNS]
+    python -m experiments estimate
+    python -m experiments.estimate [RUNS] [TRIALS] [RARE_RUNS]
 
 The event is that a car that wanders gets to the far end of a corridor of crossings, where the ego stands
 (`tests.falsifying`): one of three exits at each, so its probability is known. RUNS runs of 200 particles against TRIALS
@@ -13,9 +13,9 @@ from __future__ import annotations
 import sys
 
 import numpy as np
+from benchmarks.table import Row, show
 from tests.falsifying import NEAR, corridor, standing
 
-from benchmarks.table import Row, show
 from dubins_traffic.falsification.intervals import clopper_pearson
 from dubins_traffic.falsification.splitting import Split, split
 from dubins_traffic.problem.draw import draw_many
@@ -28,7 +28,7 @@ MOST, AWAY, SPREAD = 50_000, 0.3, 0.5
 
 
 def measure(runs: int = RUNS, trials: int = TRIALS, rare: int = RARE_RUNS) -> list[Row]:
-    """Return the rows of this benchmark."""
+    """Return the rows of this experiment."""
     return [against_monte_carlo(runs, trials), one_in_a_million(rare)]
 
 

@@ -1,6 +1,6 @@
 """How the cars that keep the rules of the road do: `rules` among `lawful`, `nemesis` and those that break rules.
 
-    python -m benchmarks.rules [TRIALS] [JOBS] [FIRST]
+    python -m experiments.rules [TRIALS] [JOBS] [FIRST]
 
 Each trial is 300 s on a random network of 6 to 40 intersections (anything from a tree to halfway as many segments as
 a grid has), with 1 to 4 goals and 1 to 6 e-agents. `lawful`: they wander, loop or go between places. `nemesis`: one
@@ -19,9 +19,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-
-from benchmarks.drawing import random_roads, random_trial
 from benchmarks.table import Row, show
+
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import Ending
@@ -29,6 +28,7 @@ from dubins_traffic.record.sink import Frames
 from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
+from experiments.drawing import random_roads, random_trial
 
 DURATION = 300.0
 KINDS = ("lawful", "nemesis", "breakers")

@@ -1,7 +1,7 @@
 """Do adversaries that have learned keep E1 and E2 under their shield, and what do they cost the ego?
 
-    python -m benchmarks adversaries
-    python -m benchmarks.adversaries [EPISODES] [JOBS]
+    python -m experiments adversaries
+    python -m experiments.adversaries [EPISODES] [JOBS]
 
 `examples/learning/adversaries.py` trains them about `lanes` for GENERATIONS generations from a fixed seed. Then they
 drive episodes of a minute that they have not seen, about `lanes`, of which the first PAIRED are driven with `lawful`
@@ -19,8 +19,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-
 from benchmarks.table import Row, show
+
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.scoring.verdict import ASSUMPTIONS
 
@@ -31,7 +31,7 @@ LOWER = 0.2
 
 
 def measure(episodes: int = EPISODES, jobs: int = 2) -> list[Row]:
-    """Return the rows of this benchmark."""
+    """Return the rows of this experiment."""
     weights = _example().train("lanes", GENERATIONS, SEED)
     with ProcessPoolExecutor(jobs) as pool:
         lanes = _driven(pool, "lanes", weights, episodes)

@@ -1,4 +1,4 @@
-"""Egos that drive as they should not, many at a time: what `benchmarks.shield` puts under the shield."""
+"""Egos that drive as they should not, many at a time: what `experiments.shield` puts under the shield."""
 
 from __future__ import annotations
 

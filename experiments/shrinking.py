@@ -1,7 +1,7 @@
 """How small do cases get: fresh ones of the built-in drivers and of all mutants, from small crossings and from a town.
 
-    python -m benchmarks shrinking
-    python -m benchmarks.shrinking [CASES] [--rows FILE] [--worlds NAME...]
+    python -m experiments shrinking
+    python -m experiments.shrinking [CASES] [--rows FILE] [--worlds NAME...]
 
 CASES cases of `lanes`, as many of `simple` and one of each mutant that tests plant are taken from searches of the
 crossing of `junction`, and as many from a town of nine intersections with eight cars (`CITY`), the first that each
@@ -19,15 +19,15 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
+from benchmarks.table import Row, show
 from tests.cases_again import driver_of, judged_afresh, still_broken
 from tests.mutant_searches import TOWN, found_cases
 from tests.mutants import MUTANTS
 
 import dubins_traffic as dt
-from benchmarks.falsify import code_of_searches
-from benchmarks.table import Row, show
 from dubins_traffic.falsification.case import Case
 from dubins_traffic.problem.configuration import Configuration
+from experiments.falsify import code_of_searches
 
 CASES = 4
 """Of each built-in driver in each world."""
@@ -44,7 +44,7 @@ MOST, SHARE = 3, 0.8
 
 
 def measure(cases: int = CASES, file: Path = ROWS, worlds: Sequence[str] = tuple(WORLDS)) -> list[Row]:
-    """Return the rows of this benchmark."""
+    """Return the rows of this experiment."""
     rows: list[Row] = []
     for world in worlds:
         found = list(shrunk(world, cases, file))
@@ -107,7 +107,7 @@ def _made_small(case: Case) -> dict[str, Any]:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="benchmarks.shrinking")
+    parser = argparse.ArgumentParser(prog="experiments.shrinking")
     parser.add_argument("cases", type=int, nargs="?", default=CASES)
     parser.add_argument("--rows", type=Path, default=ROWS)
     parser.add_argument("--worlds", nargs="+", choices=list(WORLDS), default=list(WORLDS))

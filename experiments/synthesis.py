@@ -12,10 +12,10 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from benchmarks.table import Row
 from tests.game_reference import Arrays
 from tests.property.test_game_reference import SQUARE, position, reference
 
-from benchmarks.table import Row
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Leaving
@@ -73,7 +73,7 @@ KNOWN: tuple[tuple[int, int, int, str, int, int, int, int], ...] = (
 
 TIMED = """
 import json, resource, sys, tempfile, time
-from benchmarks.synthesis import board
+from experiments.synthesis import board
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy

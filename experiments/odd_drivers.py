@@ -1,4 +1,4 @@
-"""Egos that drive oddly and break nothing: what `benchmarks.odd_egos` puts among cars that keep the rules.
+"""Egos that drive oddly and break nothing: what `experiments.odd_egos` puts among cars that keep the rules.
 
 Each drives as the controller `rules` says until its habit takes over, and all under the shield, so that they stay
 clean.

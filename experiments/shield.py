@@ -1,11 +1,11 @@
 """Random, hostile and broken controllers under the shield among `lawful` e-agents: does the ego keep rules 1 to 3?
 
-    python -m benchmarks shield
-    python -m benchmarks.shield [TRIALS] [JOBS] [FIRST] [BENT]
+    python -m experiments shield
+    python -m experiments.shield [TRIALS] [JOBS] [FIRST] [BENT]
 
 Each trial is 60 s on a random network of 6 to 40 intersections with 1 to 6 e-agents. One in four has obstacles in and
 beside the lanes, in one in four the ego starts in any direction but backward, in one in eight cars have other bodies
-or bounds, one in sixteen has 8 to 12 e-agents on 6 to 8 intersections. The kinds of `benchmarks.shield_hostile` take
+or bounds, one in sixteen has 8 to 12 e-agents on 6 to 8 intersections. The kinds of `experiments.shield_hostile` take
 turns. A tenth as many trials are driven by the controller `rules` itself: in how many does the shield step in?
 Then the same on networks of which seven in ten segments bend, BENT = 0.7, in a tenth as many trials.
 """
@@ -20,11 +20,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-
-from benchmarks.drawing import random_roads, random_trial
-from benchmarks.rules import e_agents
-from benchmarks.shield_hostile import KINDS, Hostile
 from benchmarks.table import Row, show
+
 from dubins_traffic.cars.state import EGO, Pose
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.controllers.shield import Shield
@@ -41,6 +38,9 @@ from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import REASONS, egos, shield_tables
+from experiments.drawing import random_roads, random_trial
+from experiments.rules import e_agents
+from experiments.shield_hostile import KINDS, Hostile
 
 DURATION = 60.0
 SEED = 2016

@@ -1,4 +1,4 @@
-"""Random instances for the benchmarks of drivers."""
+"""Random instances for the experiments of drivers."""
 
 from __future__ import annotations
 

@@ -1,6 +1,6 @@
 """How `lanes` drives: random instances alone and among wandering cars, against free flow.
 
-    python -m benchmarks.lanes [INSTANCES [JOBS [FIRST]]]
+    python -m experiments.lanes [INSTANCES [JOBS [FIRST]]]
 
 Each instance is a random network of 6 to 60 intersections (anything from a tree to as many segments as a grid has),
 1 to 4 goals and 1 to 8 e-agents of the kind `wander`. It is run without e-agents for ten free-flow rounds, and with
@@ -21,15 +21,15 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-
-from benchmarks.drawing import random_roads, random_trial
 from benchmarks.table import Row, show
+
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.protocols import Ending
 from dubins_traffic.record.sink import Frames
 from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.runs.single import run_trial
+from experiments.drawing import random_roads, random_trial
 
 ROUNDS = 10
 DURATION = 120.0

@@ -1,7 +1,7 @@
 """How soon are planted faults found, what does a search cost over a plain batch, and what is found in the drivers.
 
-    python -m benchmarks falsify
-    python -m benchmarks.falsify [TRIALS] [SEEDS] [LONG] [--rows FILE] [--begin SEED]
+    python -m experiments falsify
+    python -m experiments.falsify [TRIALS] [SEEDS] [LONG] [--rows FILE] [--begin SEED]
 
 The twelve mutants of `rules` that tests plant are searched from SEEDS seeds, SEED and those after it, by evolution, at
 most TRIALS trials each, for a breach of any rule; what counts is the trial in which the first breach was. Then they are
@@ -28,11 +28,11 @@ from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+from benchmarks.table import Row, show
 from tests import mutants, mutated
 from tests.mutant_searches import TOWN, first
 from tests.mutants import MUTANTS
 
-from benchmarks.table import Row, show
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.falsification import search
 from dubins_traffic.falsification.crew import Here
@@ -99,7 +99,7 @@ def code_of_searches() -> str:
 def measure(
     trials: int = TRIALS, seeds: int = SEEDS, long: int = LONG, file: Path = ROWS, begin: int = BEGIN
 ) -> list[Row]:
-    """Return the rows of this benchmark."""
+    """Return the rows of this experiment."""
     rows = planted(trials, range(begin, begin + seeds), file)
     return [*rows, *overheads(), *(drivers(long, file.parent) if long else ())]
 
@@ -259,7 +259,7 @@ def _told(found: Found) -> str:
 
 
 def _arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(prog="benchmarks.falsify")
+    parser = argparse.ArgumentParser(prog="experiments.falsify")
     for name, usual in (("trials", TRIALS), ("seeds", SEEDS), ("long", LONG)):
         parser.add_argument(name, type=int, nargs="?", default=usual)
     parser.add_argument("--rows", type=Path, default=ROWS)

@@ -1,7 +1,7 @@
 """How `rules` does among `lawful` cars on the two largest towns with one lane in each direction that come with SUMO.
 
-    python -m benchmarks towns
-    python -m benchmarks.towns [TRIALS] [JOBS] [FIRST]
+    python -m experiments towns
+    python -m experiments.towns [TRIALS] [JOBS] [FIRST]
 
 Each town is imported from SUMO's own file, which `scripts/peers.sh sumo` installs if it is missing. Each trial is 300 s
 with 1 to 4 goals. The e-agents are `lawful` ones that wander or go between places: a sixteenth to a fourth as many as
@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.table import Row, show
+
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
@@ -68,7 +69,7 @@ def reduced(town: str) -> Reduction:
     """Return the network to which a town is reduced, and what is lost."""
     folder = games()
     if folder is None:
-        raise SystemExit("benchmarks: SUMO is not installed; scripts/peers.sh sumo says why")
+        raise SystemExit("experiments: SUMO is not installed; scripts/peers.sh sumo says why")
     return SumoNet().reduced((folder / TOWNS[town]).read_text())
 
 
