@@ -6,9 +6,10 @@ SHELL := /bin/bash
 
 BIN := .venv/bin
 WORKERS ?= 4
-SETUP := pyproject.toml constraints.txt scripts/setup.sh
+LCM := scripts/lcm_messages.py src/dubins_traffic/transports/lcm/dubins_traffic_lcm.lcm
+SETUP := pyproject.toml constraints.txt setup.py scripts/setup.sh $(LCM)
 
-.PHONY: help setup demo test test-tools kernels tools test-all golden docs results release check format bench clean
+.PHONY: help setup demo test test-tools kernels tools test-all golden docs results release check format schemas bench clean
 
 help: ## show this text
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
@@ -79,6 +80,9 @@ check: .venv/.installed-dev ## format, lint, types and layers
 format: .venv/.installed-dev ## format the sources and mend what the linter can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
+
+schemas: .venv/.installed-dev ## the JSON Schemas that the package ships, made from the models
+	$(BIN)/python -m scripts.schemas
 
 bench: .venv/.installed-dev ## speed, as ratios to limits measured in the same run: ten minutes
 	@$(BIN)/python -m benchmarks

@@ -1,5 +1,9 @@
-"""Writes the commit that a package is built from into it; all else stands in pyproject.toml."""
+"""Makes the code of the LCM messages, and writes the commit that a package is built from into it.
 
+All else stands in pyproject.toml.
+"""
+
+import runpy
 import subprocess
 from pathlib import Path
 
@@ -44,4 +48,5 @@ class SourcesWithCommit(sdist):
         (Path(base_dir) / PACKAGE / NAME).write_text(commit(), encoding="ascii")
 
 
+runpy.run_path(str(HERE / "scripts" / "lcm_messages.py"))["make"]()
 setup(cmdclass={"build_py": WithCommit, "sdist": SourcesWithCommit})

@@ -4,7 +4,7 @@
 
 Each instance is a random network of 6 to 60 intersections (anything from a tree to as many segments as a grid has),
 1 to 4 goals and 1 to 8 e-agents of the kind `wander`. It is run without e-agents for ten free-flow rounds, and with
-them for 120 s. Free flow is that of `dubins_traffic.routing.free_flow`, turning round at dead ends only. "Stood while
+them for 120 s. Free flow is that of `experiments.free_flow`, turning round at dead ends only. "Stood while
 free" is the longest time for which the ego stood although, all the while, nobody was within 1.5 m ahead in its lane
 and, if it was within 2 m of its lane's end, nobody's body met the disc of the intersection there (for an ego inside a
 disc: nobody else met that disc).
@@ -27,9 +27,9 @@ from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.protocols import Ending
 from dubins_traffic.record.sink import Frames
-from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.runs.single import run_trial
 from experiments.drawing import random_roads, random_trial
+from experiments.free_flow import free_flow
 
 ROUNDS = 10
 DURATION = 120.0

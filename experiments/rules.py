@@ -5,7 +5,7 @@
 Each trial is 300 s on a random network of 6 to 40 intersections (anything from a tree to halfway as many segments as
 a grid has), with 1 to 4 goals and 1 to 6 e-agents. `lawful`: they wander, loop or go between places. `nemesis`: one
 nemesis among them. `breakers`: each breaks every rule that it may break. Of TRIALS trials of the first kind, a fifth as
-many are run of each of the others. Free flow is that of `dubins_traffic.routing.free_flow`.
+many are run of each of the others. Free flow is that of `experiments.free_flow`.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import Ending
 from dubins_traffic.record.sink import Frames
-from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
 from experiments.drawing import random_roads, random_trial
+from experiments.free_flow import free_flow
 
 DURATION = 300.0
 KINDS = ("lawful", "nemesis", "breakers")

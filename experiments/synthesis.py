@@ -21,10 +21,10 @@ from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Leaving
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.play import Environment, play
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Solution, solve
 from dubins_traffic.synthesis.strategy import Strategy
+from experiments.play import Environment, play
 
 ROOT = Path(__file__).resolve().parents[1]
 OMEGA = ROOT / "build" / "crosscheck" / "omega" / "bin" / "python"

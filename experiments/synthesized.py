@@ -6,7 +6,7 @@ Each trial is 300 s with 1 to 3 e-agents: `lawful` ones that wander or go betwee
 in about every other trial. Half of the trials are on the 3x4 grid, with goals at two opposite corners and strategies
 that have been saved; the others on random networks of 6 to 9 intersections with 1 to 4 goals, whose games are solved
 when they start. Some of these games are lost; then the ego drives as `rules` does where its strategy does not win.
-Free flow is that of `dubins_traffic.routing.free_flow`.
+Free flow is that of `experiments.free_flow`.
 """
 
 from __future__ import annotations
@@ -29,7 +29,6 @@ from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.sink import Frames
-from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
@@ -38,6 +37,7 @@ from dubins_traffic.synthesis.road_play import NEW_TICKET, UNKNOWN_MOVE
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
 from experiments.drawing import random_roads, random_trial
+from experiments.free_flow import free_flow
 
 DURATION = 300.0
 TRIALS = 2000

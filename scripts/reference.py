@@ -1,6 +1,6 @@
 """The parts of `docs/documents.md` and `docs/competitions/file.md` that are read off the code.
 
-``python -m dubins_traffic.cli.reference PAGE...`` renews them.
+``python -m scripts.reference PAGE...`` renews them.
 """
 
 from __future__ import annotations
@@ -8,16 +8,46 @@ from __future__ import annotations
 import re
 import sys
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import Any
 
+from pydantic import BaseModel
+
+from dubins_traffic.competition.settings import CompetitionModel, Limits, PhaseModel, Quota, Ranking
+from dubins_traffic.competition.submission import Manifest
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, write_text
-
-if TYPE_CHECKING:
-    from dubins_traffic.runs.catalogue import Parameter
+from dubins_traffic.runs import catalogue
+from dubins_traffic.runs.catalogue import Parameter
 
 _PART = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 """A part of a page between two marks."""
+
+
+_TABLES: dict[str, type[BaseModel]] = {
+    "The competition": CompetitionModel,
+    "`[ranking]`": Ranking,
+    "`[phases.NAME]`": PhaseModel,
+    "`limits` of a phase": Limits,
+    "`quota` of a phase": Quota,
+    "`controller.toml` of a submission": Manifest,
+}
+
+
+def _competition_tables() -> dict[str, tuple[Parameter, ...]]:
+    """Return the keys of each table, by the heading under which they are described."""
+    return {heading: tuple(_rows(model)) for heading, model in _TABLES.items()}
+
+
+def _rows(model: type[BaseModel]) -> list[Parameter]:
+    return [
+        Parameter(name, _shown(own.default), own.is_required(), own.description or "")
+        for name, own in model.model_fields.items()
+    ]
+
+
+def _shown(default: Any) -> Any:
+    """Return a default as JSON has it; a table whose keys have defaults is empty by default."""
+    return {} if isinstance(default, BaseModel) else default
 
 
 def renewed(page: str) -> str:
@@ -32,8 +62,6 @@ def renewed(page: str) -> str:
 
 
 def _part(name: str) -> str:
-    from dubins_traffic.runs import catalogue
-
     match name:
         case "agents":
             parts = [
@@ -44,10 +72,9 @@ def _part(name: str) -> str:
         case "rules":
             return "\n".join(_table(catalogue.rules()))
         case "competition":
-            from dubins_traffic.competition.reference import tables
-
             parts = [
-                f"### {heading}\n\n" + "\n".join(_table(rows, "key")) for heading, rows in tables().items()
+                f"### {heading}\n\n" + "\n".join(_table(rows, "key"))
+                for heading, rows in _competition_tables().items()
             ]
             return "\n\n".join(parts)
         case "configurations" | "controllers" | "simulators":

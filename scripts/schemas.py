@@ -1,25 +1,32 @@
-"""The JSON Schemas of the documents: generated from the models, shipped beside them.
+"""The JSON Schemas of all documents: made from the models, shipped beside them. ``make schemas`` writes all anew.
 
-``python -m dubins_traffic.problem.schema`` writes them anew. JSON Schema says less than the reader checks: relations
-between values (a network that is planar, bounds in order) and numbers such as 3.0 where an integer is asked.
+JSON Schema says less than the readers check: relations between values (a network that is planar, bounds in order) and
+numbers such as 3.0 where an integer is asked. Files of campaigns and competitions are TOML; their schemas describe what
+they say.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from importlib.resources import files
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field
 
+import dubins_traffic
+from dubins_traffic.campaign.settings import CampaignModel
+from dubins_traffic.competition.settings import CompetitionModel
 from dubins_traffic.problem.faults import Open, Strict
 from dubins_traffic.problem.kinds import KINDS, NAMES_2016, PROGRAM
 from dubins_traffic.problem.parts import LatticePoint, Length
 from dubins_traffic.problem.settings import InstanceModel, InstanceModel0, Settings, Settings0
 from dubins_traffic.problem.trial_data import TrialDataModel
+from dubins_traffic.suites.result_model import ResultModel
+from dubins_traffic.suites.settings import SuiteModel
 
+MAKE = "make schemas"
+"""The command that writes all of them."""
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 ID = "urn:dubins-traffic:"
 Transform = Annotated[list[float], Field(min_length=3, max_length=3)]
@@ -42,17 +49,35 @@ class RoadNetworkModel(Open):
     )
 
 
-def schemas() -> dict[str, dict[str, Any]]:
-    """Return the schemas by name: network, configuration, instance, trial-data."""
-    return {name: build() for name, build in _DOCUMENTS.items()}
+def schemas() -> dict[tuple[str, str], dict[str, Any]]:
+    """Return all schemas, by the room of the package that ships them and their name."""
+    return {
+        **{("problem", name): build() for name, build in _DOCUMENTS.items()},
+        ("campaign", "campaign"): _with_configurations(CampaignModel, "campaign"),
+        ("competition", "competition"): _with_configurations(CompetitionModel, "competition"),
+        ("suites", "suite"): _with_configurations(SuiteModel, "suite"),
+        ("suites", "suite-result"): _complete(
+            ResultModel.model_json_schema(), "suite-result", "Results of a suite"
+        ),
+    }
 
 
-def schema_text(schema: dict[str, Any]) -> str:
+def text(schema: dict[str, Any]) -> str:
     """Return a schema as text."""
     return json.dumps(schema, indent=2, sort_keys=True) + "\n"
 
 
-def with_configurations(model: type[BaseModel], name: str) -> dict[str, Any]:
+def place(room: str, name: str) -> Path:
+    """Return where a schema is shipped."""
+    return Path(dubins_traffic.__file__).parent / room / "schemas" / f"{name}.json"
+
+
+def shipped(name: str, room: str = "problem") -> dict[str, Any]:
+    """Return the schema called `name` that is shipped with a room of the package."""
+    return json.loads(place(room, name).read_text(encoding="utf-8"))
+
+
+def _with_configurations(model: type[BaseModel], name: str) -> dict[str, Any]:
     """Return the schema called `name` of a file that lists configurations; they refer to the schema of configurations.
 
     `model` is the file's; its configurations are of a model called ``ConfigurationEntry``.
@@ -61,20 +86,7 @@ def with_configurations(model: type[BaseModel], name: str) -> dict[str, Any]:
     document = schema["$defs"]["ConfigurationEntry"]["properties"]["document"]
     document["anyOf"][0] = {"$ref": ID + "configuration"}
     schema["properties"]["version"] = {"const": 0, "description": "0"}
-    return {"$schema": DIALECT, "$id": ID + name, **schema, "title": name.capitalize()}
-
-
-def write_schema(room: str, name: str, schema: dict[str, Any]) -> None:
-    """Write a schema beside the models of a room of the package."""
-    folder = Path(__file__).parents[1] / room / "schemas"
-    folder.mkdir(exist_ok=True)
-    (folder / f"{name}.json").write_text(schema_text(schema), encoding="utf-8")
-
-
-def shipped_schema(name: str, room: str = "problem") -> dict[str, Any]:
-    """Return the schema called `name` that is shipped with a room of the package."""
-    item = files(f"dubins_traffic.{room}") / "schemas" / f"{name}.json"
-    return json.loads(item.read_text(encoding="utf-8"))
+    return _complete(schema, name, name.capitalize())
 
 
 _ROADS_ONCE = {
@@ -179,5 +191,5 @@ _DOCUMENTS: Mapping[str, Callable[[], dict[str, Any]]] = {
 
 
 if __name__ == "__main__":
-    for each, made in schemas().items():
-        write_schema("problem", each, made)
+    for (each_room, each), made in schemas().items():
+        place(each_room, each).write_text(text(made), encoding="utf-8")
