@@ -1,9 +1,10 @@
-"""Makes the code of the LCM messages, and writes the commit that a package is built from into it.
+"""Makes the code of the LCM messages; puts the commit, and the script that fetches Gazebo, into what is built.
 
 All else stands in pyproject.toml.
 """
 
 import runpy
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -14,6 +15,7 @@ from setuptools.command.sdist import sdist
 NAME = "commit.txt"
 HERE = Path(__file__).parent
 PACKAGE = Path("src") / "dubins_traffic"
+INSTALLER = "gazebo-packages.sh"
 
 
 def commit() -> str:
@@ -30,13 +32,15 @@ def commit() -> str:
 
 
 class WithCommit(build_py):
-    """The modules, and the commit beside them."""
+    """The modules, and beside them the commit, and the script that fetches Gazebo."""
 
     def run(self) -> None:
         """Build the modules; an editable installation stays as it is."""
         super().run()
         if not self.editable_mode:
-            (Path(self.build_lib) / "dubins_traffic" / NAME).write_text(commit(), encoding="ascii")
+            package = Path(self.build_lib) / "dubins_traffic"
+            (package / NAME).write_text(commit(), encoding="ascii")
+            shutil.copy(HERE / "scripts" / INSTALLER, package / "simulators" / "gazebo")
 
 
 class SourcesWithCommit(sdist):

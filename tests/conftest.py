@@ -1,7 +1,8 @@
 """What holds for all tests.
 
 Two marks say what `make test` leaves to `make test-tools`: `tools` (tests/tools.py), and `long`, for what takes more
-than `LONG_S` seconds of processor time; the summary names the tests that take so long without the mark.
+than `LONG_S` seconds of processor time; the summary names the tests that take so long without the mark. Tests outside
+the folders in `SHORT` are long but for those with the mark `path`, one path through each part at least.
 
 Kernels are compiled before they run, as on a machine where all has been compiled: tests of other tiers say so. Programs
 that tests start keep their bytecode, whatever the surroundings say: else each of them compiles 300 files first. Garbage
@@ -15,6 +16,7 @@ import os
 import signal
 import sys
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -22,6 +24,8 @@ from hypothesis import HealthCheck, settings
 from tests import tools
 
 LONG_S = 10.0
+HERE = Path(__file__).parent
+SHORT = {"architecture", "conformance", "golden", "property", "unit"}
 SPENT = "processor_s"
 
 os.environ.setdefault("DUBINS_TRAFFIC_KERNELS", "compiled")
@@ -37,6 +41,15 @@ _before = pytest.StashKey[float]()
 def _spent() -> float:
     """Return the seconds of processor time of this process and of what it has started and waited for."""
     return sum(os.times()[:4])
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is long by its folder."""
+    for item in items:
+        elsewhere = item.path.is_relative_to(HERE) and item.path.relative_to(HERE).parts[0] not in SHORT
+        if elsewhere and item.get_closest_marker("path") is None:
+            item.add_marker("long")
 
 
 @pytest.hookimpl(wrapper=True)

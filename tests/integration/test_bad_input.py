@@ -18,6 +18,8 @@ import pytest
 
 from dubins_traffic.cli.main import main
 
+pytestmark = pytest.mark.path
+
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 
 NETWORK: dict[str, Any] = {"version": 0, "length": 3, "transform": [0, 0, 0], "shape": [2, 2]}

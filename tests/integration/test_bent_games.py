@@ -27,6 +27,8 @@ from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
 from tests.chain_reference import RING, SNAKE, Track
 
+pytestmark = pytest.mark.path
+
 BENT = {"random": {"intersections": 6, "segments": 7, "bent": 1.0, "rigid_motion": True}}
 ALL = ("E1", "E2", "E3", "E4", "E5", "E6")
 

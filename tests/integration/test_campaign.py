@@ -39,6 +39,7 @@ def kept(folder: Path) -> int:
     return sum(int(last) - int(first) + 1 for first, last in names)
 
 
+@pytest.mark.path
 def test_the_number_of_workers_does_not_show(tmp_path: Path, table: bytes) -> None:
     assert succeed(written(tmp_path, campaign()), tmp_path / "out", "--workers", "2") == table
 

@@ -103,6 +103,7 @@ def test_means_medians_and_differences_are_those_of_the_table(folder: Path) -> N
             assert (int(line["count"]), int(line["of"])) == (sum(excused), len(excused))
 
 
+@pytest.mark.path
 def test_controllers_are_ranked_by_counted_rounds(folder: Path) -> None:
     found = rows(folder)
     for row in found:

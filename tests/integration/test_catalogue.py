@@ -18,6 +18,8 @@ from dubins_traffic.problem.kinds import KINDS
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.runs import catalogue
 
+pytestmark = pytest.mark.path
+
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "documents.md"
 
 

@@ -105,6 +105,7 @@ def test_the_course_is_odd() -> None:
     assert any(not instance.e_agents for instance in instances.values())
 
 
+@pytest.mark.path
 def test_a_good_controller_passes(faulty: str, capsys: pytest.CaptureFixture[str]) -> None:
     status = main(["check-controller", f"{faulty}:Good", "--json"])
     found: dict[str, Any] = json.loads(capsys.readouterr().out)

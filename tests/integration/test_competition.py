@@ -153,6 +153,7 @@ def test_what_is_finished_is_kept_on_a_full_disk(tmp_path: Path) -> None:
     assert evaluate(phase, submission, tmp_path / "two") == whole
 
 
+@pytest.mark.path
 def test_a_trial_that_can_not_be_drawn_is_no_fault_of_the_submission(tmp_path: Path) -> None:
     full = {**SHORT, "e-agents": [{"type": "lawful", "name": "car", "count": 90}]}
     found = competition(
@@ -358,6 +359,7 @@ def test_evaluating_needs_no_extra(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["python", "cpp", "competition"])
+@pytest.mark.path
 def test_templates_are_whole_and_spoil_nothing(tmp_path: Path, name: str) -> None:
     paths = write_template(name, tmp_path / "new")
     assert all(path.read_text() for path in paths)

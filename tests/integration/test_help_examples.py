@@ -35,6 +35,7 @@ def examples() -> list[str]:
 
 
 @pytest.mark.parametrize("line", examples())
+@pytest.mark.path
 def test_an_example_can_be_read(line: str) -> None:
     command: Any = typer.main.get_command(app)
     words = shlex.split(line.partition(" | ")[0].partition(" > ")[0])
@@ -53,6 +54,7 @@ SESSIONS = [
 
 
 @pytest.mark.parametrize("line", SESSIONS)
+@pytest.mark.path
 def test_an_example_of_a_session_runs_and_says_what_it_does(line: str, tmp_path: Path) -> None:
     """It compiles, says where it is and what it waits for, and ends as asked."""
     kind = line.partition(" ")[0]

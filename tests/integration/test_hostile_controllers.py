@@ -219,6 +219,7 @@ FAULTY = {
 
 
 @pytest.mark.parametrize("name", FAULTY)
+@pytest.mark.path
 def test_whatever_a_controller_raises_ends_its_trial_alone_and_in_batches(name):
     single = run_trial(instance(), f"hostile.py:{name}").ending
     assert single.end == "controller_fault"
@@ -310,6 +311,7 @@ NONSENSE: dict[str, Callable[[], Any]] = {
 
 
 @pytest.mark.parametrize("kind", NONSENSE)
+@pytest.mark.path
 def test_an_answer_that_is_nonsense_is_a_fault(kind):
     class Talks:
         def start(self, problem: object) -> None: ...

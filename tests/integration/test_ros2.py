@@ -107,6 +107,7 @@ def test_peers_are_counted_while_others_come_and_go(domain: int) -> None:
         graph.close()
 
 
+@pytest.mark.path
 def test_process_to_process(domain: int, config: str, tmp_path: Path) -> None:
     expected, instance = reference(config, tmp_path)
     arguments = (

@@ -46,6 +46,7 @@ def installed(folder: Path) -> dict[str, str]:
     return around | {"PATH": f"{programs}{os.pathsep}{around['PATH']}"}
 
 
+@pytest.mark.path
 def test_the_first_page_leads_there() -> None:
     """It installs what `installed` does, and links to each step; the last one names its program."""
     page = (ROOT / "website" / "index.md").read_text(encoding="utf-8")

@@ -74,6 +74,7 @@ def test_where_the_strategy_does_not_win_the_ego_keeps_the_rules() -> None:
     assert Counter(kind for _, kind, _ in events.found)[STRATEGY_LEFT] == 1
 
 
+@pytest.mark.path
 def test_a_saved_strategy_drives_as_one_that_is_found_at_the_start(tmp_path: Path) -> None:
     own = instance(3, 60.0)
     path = tmp_path / "own.npz"

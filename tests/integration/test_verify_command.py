@@ -71,6 +71,7 @@ def test_records_of_runs_batches_and_campaigns_are_verified(run: Run, config: Pa
         assert run("verify", *records).splitlines() == [f"{path}: verified" for path in records]
 
 
+@pytest.mark.path
 def test_one_line_a_record_and_the_exit_status(run: Run, record: Path) -> None:
     data = record.read_bytes()
     Path("bad.mcap").write_bytes(rebuilt(data, put(schema.FRAMES, 40, "x", 0, 0.0, 3)))
