@@ -529,7 +529,3 @@ def test_what_nobody_expected_is_one_line_too(monkeypatch, run_here):
     assert err.startswith("dubins-traffic: unexpected ValueError: two lines (")
     assert "--debug" in err
     assert err.count("\n") == 1
-
-
-def test_there_are_enough_kinds_of_bad_input():
-    assert len(DOCUMENTS) + len(OPTIONS) >= 40
