@@ -40,8 +40,13 @@ def show(title: str, rows: Sequence[Row]) -> bool:
     for column in ("what", "measured", "bar", ""):
         table.add_column(column, overflow="fold")
     for row in rows:
-        table.add_row(
-            escape(row.name), escape(row.figure), escape(row.bar), "met" if row.met else "[b]missed[/b]"
-        )
+        table.add_row(escape(row.name), escape(row.figure), escape(row.bar), _told(row))
     Console(width=120).print(table)
     return all(row.met for row in rows)
+
+
+def _told(row: Row) -> str:
+    """Return whether a bar is met, nothing where there is none."""
+    if not row.met:
+        return "[b]missed[/b]"
+    return "met" if row.bar else ""

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from tests import tools
+from tests import conftest, tools
 from tests.architecture.house import ROOT
 
 MARKS = ("tools", "long")
@@ -41,6 +41,38 @@ def test_each_test_is_in_one_part_and_in_one_alone() -> None:
     for carried in product((False, True), repeat=len(MARKS)):
         marks = dict(zip(MARKS, carried, strict=True))
         assert sum(bool(eval(one, {}, dict(marks))) for one in chosen) == 1, marks
+
+
+class Marked:
+    """A test in a file, with marks."""
+
+    def __init__(self, path: str, *marks: str) -> None:
+        self.path, self.marks = ROOT / path, {*marks}
+
+    def get_closest_marker(self, name: str) -> str | None:
+        return name if name in self.marks else None
+
+    def add_marker(self, name: str) -> None:
+        self.marks.add(name)
+
+
+@pytest.mark.parametrize(
+    ("path", "marks", "is_long"),
+    [
+        ("tests/unit/test_x.py", (), False),
+        ("tests/unit/test_x.py", ("long",), True),
+        ("tests/integration/test_x.py", (), True),
+        ("tests/integration/test_x.py", ("path",), False),
+        ("tests/sandbox/test_x.py", ("tools",), True),
+        ("tests/anew/test_x.py", (), True),
+    ],
+)
+def test_a_folder_decides_what_is_long_and_a_mark_may_say_otherwise(
+    path: str, marks: tuple[str, ...], is_long: bool
+) -> None:
+    item = Marked(path, *marks)
+    conftest.pytest_collection_modifyitems([item])  # pyright: ignore[reportArgumentType]
+    assert ("long" in item.marks) == is_long
 
 
 def test_continuous_integration_runs_both() -> None:
