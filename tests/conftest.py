@@ -72,7 +72,9 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
     report = yield
     if report.skipped and not hasattr(report, "wasxfail") and os.environ.get("CI") == "true":
         report.outcome, report.longrepr = "failed", f"left out, which CI=true forbids: {report.longrepr}"
-    if call.when == "teardown" and not any(item.get_closest_marker(name) for name in ("tools", "long")):
+    if call.when == "teardown" and not any(
+        item.get_closest_marker(name) for name in ("tools", "long", "path")
+    ):
         report.user_properties.append((SPENT, _spent() - item.stash[_before]))
     return report
 

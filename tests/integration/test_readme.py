@@ -60,7 +60,6 @@ def run_block(language: str, text: str, folder: Path) -> None:
     assert (ran.returncode, told) == (0, []), text
 
 
-@pytest.mark.path
 def test_all_code_runs(tmp_path):
     """As it stands; of the trials of the search `make test` runs a part, and `make test-all` all."""
     ran = [*runnable(README), *runnable(TOUR)]
