@@ -6,21 +6,26 @@ SHELL := /bin/bash
 
 BIN := .venv/bin
 WORKERS ?= 4
-SETUP := pyproject.toml constraints.txt scripts/setup.sh
+LCM := scripts/lcm_messages.py src/dubins_traffic/transports/lcm/dubins_traffic_lcm.lcm
+SETUP := pyproject.toml constraints.txt setup.py scripts/setup.sh $(LCM)
 
-.PHONY: help setup demo test kernels tools test-all golden docs results release check format bench clean
+.PHONY: help setup demo test test-tools kernels tools test-all golden docs results release check format schemas bench clean
 
 help: ## show this text
-	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 10
+	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
 
 setup: .venv/.installed-dev ## install the package and everything that developers need into .venv
 
 demo: .venv/.installed-plot ## three trials with two controllers, scored, drawn and replayed in demo-output/
 	@$(BIN)/python examples/compare.py demo demo-output --controllers lanes simple --trials 3
 
-test: .venv/.installed-dev ## all checks, then all tests
-	@$(MAKE) --no-print-directory --jobs=3 check tools kernels
-	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
+test: .venv/.installed-dev ## all checks, then the tests that need nothing but Python: ten minutes
+	@$(MAKE) --no-print-directory --jobs=2 check kernels
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "not (tools or long)"
+
+test-tools: .venv/.installed-dev ## the other tests: with tools, which are installed first, and those that take long: half an hour
+	@$(MAKE) --no-print-directory --jobs=2 tools kernels
+	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "tools or long"
 
 kernels: .venv/.installed-dev
 	-@$(BIN)/dubins-traffic warm --all
@@ -32,7 +37,7 @@ tools: .venv/.installed-dev
 	@scripts/gazebo.sh
 
 test-all: export PYTEST_TIMEOUT := 86400
-test-all: test ## all tests, then those of which the suite runs a part, in full: hours
+test-all: test test-tools ## all tests, then those of which the suite runs a part, in full: hours
 	DUBINS_TRAFFIC_TRIALS_2016=50 $(BIN)/python -m pytest tests/integration/test_ros1_2016.py
 	DUBINS_TRAFFIC_MUTANTS=full $(BIN)/python -m pytest tests/integration/test_search_of_mutants.py -k mutant_stands
 	DUBINS_TRAFFIC_SPECIFICATIONS=full $(BIN)/python -m pytest tests/crosscheck/test_game_specifications.py
@@ -52,7 +57,7 @@ test-all: test ## all tests, then those of which the suite runs a part, in full:
 	DUBINS_TRAFFIC_ESTIMATES=full $(BIN)/python -m pytest tests/integration/test_falsify.py \
 		tests/integration/test_falsify_targets.py tests/integration/test_splitting.py \
 		-k "splitting or million or guides"
-	$(BIN)/python -m benchmarks verify odd_egos rules towns
+	$(BIN)/python -m experiments verify odd_egos rules towns
 
 golden: .venv/.installed-dev ## compare what trials, batches, campaigns and games give with tests/golden/hashes.json
 	$(BIN)/python -m tests.golden.hashes
@@ -76,12 +81,15 @@ format: .venv/.installed-dev ## format the sources and mend what the linter can
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: .venv/.installed-dev ## speed, as ratios to named peers and limits measured in the same run
+schemas: .venv/.installed-dev ## the JSON Schemas that the package ships, made from the models
+	$(BIN)/python -m scripts.schemas
+
+bench: .venv/.installed-dev ## speed, as ratios to limits measured in the same run: ten minutes
 	@$(BIN)/python -m benchmarks
 
 clean: ## remove .venv, the demo's output and everything that tools leave behind
 	rm -rf .venv demo-output out build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache
-	find src tests benchmarks examples -name __pycache__ -prune -exec rm -rf {} +
+	find src tests benchmarks experiments examples -name __pycache__ -prune -exec rm -rf {} +
 	rm -rf src/dubins_traffic.egg-info
 
 .venv/.installed-plot: $(SETUP)

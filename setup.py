@@ -1,5 +1,10 @@
-"""Writes the commit that a package is built from into it; all else stands in pyproject.toml."""
+"""Makes the code of the LCM messages; puts the commit, and the script that fetches Gazebo, into what is built.
 
+All else stands in pyproject.toml.
+"""
+
+import runpy
+import shutil
 import subprocess
 from pathlib import Path
 
@@ -10,6 +15,7 @@ from setuptools.command.sdist import sdist
 NAME = "commit.txt"
 HERE = Path(__file__).parent
 PACKAGE = Path("src") / "dubins_traffic"
+INSTALLER = "gazebo-packages.sh"
 
 
 def commit() -> str:
@@ -26,13 +32,15 @@ def commit() -> str:
 
 
 class WithCommit(build_py):
-    """The modules, and the commit beside them."""
+    """The modules, and beside them the commit, and the script that fetches Gazebo."""
 
     def run(self) -> None:
         """Build the modules; an editable installation stays as it is."""
         super().run()
         if not self.editable_mode:
-            (Path(self.build_lib) / "dubins_traffic" / NAME).write_text(commit(), encoding="ascii")
+            package = Path(self.build_lib) / "dubins_traffic"
+            (package / NAME).write_text(commit(), encoding="ascii")
+            shutil.copy(HERE / "scripts" / INSTALLER, package / "simulators" / "gazebo")
 
 
 class SourcesWithCommit(sdist):
@@ -44,4 +52,5 @@ class SourcesWithCommit(sdist):
         (Path(base_dir) / PACKAGE / NAME).write_text(commit(), encoding="ascii")
 
 
+runpy.run_path(str(HERE / "scripts" / "lcm_messages.py"))["make"]()
 setup(cmdclass={"build_py": WithCommit, "sdist": SourcesWithCommit})

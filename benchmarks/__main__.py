@@ -1,79 +1,63 @@
-"""All benchmarks: `python -m benchmarks [NAME...]`. The exit status is 1 if a bar is missed.
+"""Speed in one table: `python -m benchmarks [NAME...]`, in ten minutes. The exit status is 1 if a bar is missed.
 
-`overview` is the table of all speeds beside those of other simulators, which it installs first where they are missing:
-two minutes more. Its parts `queries`, `generation` and `peers` are run by themselves only if they are named, and so is
-`million`, which takes some minutes.
-
-`motion`, `single`, `startup`, `judging`, `batch`, `world`, `scale`, `rendering`, `monitors`, `lcm`, `sandbox`: about a
-minute; `envs`, which compiles an earlier commit, two and more; `first_use`, with empty caches of kernels, some;
-`service`, `ros1`: three; `first_submission`, which installs the package: one; `verify` runs 500 short trials and
-verifies their records, in two; `lanes` runs 400 trials and `rules` 1,400, which takes some minutes each, and so do
-`odd_egos` for its 2,000 and `towns` for its 200, which installs SUMO first where that is missing; `synthesis` solves
-its games in about two minutes; `campaign` runs 300,000 short trials in as many; `competition` judges 1,000 trials of
-strangers twice and `shield` runs 24,200 of a minute each, a quarter of an hour both; `adversaries` 10,000 episodes of a
-minute, in half an hour, and so does `synthesized` for its 2,000 of 300 s; `estimate` splits some 500,000 trials in a
-quarter of an hour; `shrinking` shrinks 40 cases in some minutes; `falsify` searches some million trials, in hours.
+Others run if they are named: `overview` is the table of benchmarks/README.md, beside other simulators, which it
+installs first where they are missing (two minutes more), and `peers` its part about these; `first_use` runs with empty
+caches of kernels; `lcm`, `ros1`, `gazebo` and `sandbox` need what they are called after; `service` and
+`first_submission` run a service, `campaign` 300,000 short trials, also on Ray, and `scale` a world of 10,000 cars.
+What trials show of drivers, rules and searches is in `experiments`.
 """
 
 from __future__ import annotations
 
 import importlib
 import sys
+from dataclasses import replace
 
-from benchmarks.table import show
+from benchmarks.table import Row, machine, show
 
 NAMES = (
     "motion",
     "single",
     "startup",
-    "first_use",
-    "judging",
     "batch",
-    "envs",
+    "judging",
     "world",
-    "scale",
+    "envs",
     "rendering",
     "monitors",
-    "lanes",
-    "rules",
-    "verify",
-    "odd_egos",
-    "towns",
-    "shield",
+    "queries",
+    "generation",
+)
+OTHERS = (
+    "campaign",
+    "first_submission",
+    "first_use",
+    "gazebo",
     "lcm",
+    "overview",
+    "peers",
     "ros1",
     "sandbox",
-    "synthesis",
-    "synthesized",
-    "counter",
-    "falsify",
-    "shrinking",
-    "estimate",
-    "adversaries",
-    "gazebo",
-    "campaign",
-    "competition",
+    "scale",
     "service",
-    "first_submission",
-    "overview",
 )
-PARTS = ("queries", "generation", "peers", "million")
 
 
 def main(names: list[str]) -> int:
-    """Run the named benchmarks, or all."""
-    unknown = [name for name in names if name not in NAMES + PARTS]
+    """Run the named benchmarks, or those of the one table."""
+    unknown = [name for name in names if name not in NAMES + OTHERS]
     if unknown:
         print(
-            f"benchmarks: unknown: {', '.join(unknown)}; expected some of {', '.join(NAMES + PARTS)}",
+            f"benchmarks: unknown: {', '.join(unknown)}; expected some of {', '.join(NAMES + OTHERS)}",
             file=sys.stderr,
         )
         return 2
-    met = True
+    rows: list[Row] = []
     for name in names or NAMES:
-        rows = importlib.import_module(f"benchmarks.{name}").measure()
-        met = show(name, rows) and met
-    return 0 if met else 1
+        print(f"benchmarks: {name}", file=sys.stderr)
+        measured = importlib.import_module(f"benchmarks.{name}").measure()
+        rows += [replace(row, name=f"{name}: {row.name}") for row in measured]
+    return 0 if show(machine(), rows) else 1
 
 
 if __name__ == "__main__":

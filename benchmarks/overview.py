@@ -7,14 +7,11 @@ prints the table and puts it into `benchmarks/README.md`; `python -m benchmarks 
 
 from __future__ import annotations
 
-import os
-import platform
 from collections.abc import Sequence
-from importlib.metadata import version
 from pathlib import Path
 
 from benchmarks import campaign, envs, generation, monitors, peers, queries
-from benchmarks.table import Row, show
+from benchmarks.table import Row, machine, show
 from dubins_traffic.files import write_text
 
 README = Path(__file__).parent / "README.md"
@@ -41,16 +38,6 @@ def markdown(rows: Sequence[Row]) -> str:
 
 def _bar(row: Row) -> str:
     return f" (bar: {row.bar}, {'met' if row.met else 'missed'})" if row.bar else ""
-
-
-def machine() -> str:
-    """Return a sentence about processor and versions."""
-    cpuinfo = Path("/proc/cpuinfo")
-    lines = cpuinfo.read_text().splitlines() if cpuinfo.is_file() else []
-    names = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    kind = names[0] if names else platform.machine()
-    parts = [f"{name} {version(name)}" for name in ("numpy", "numba")]
-    return f"{os.cpu_count()} cores of {kind}, Python {platform.python_version()}, {', '.join(parts)}."
 
 
 def put(text: str, table: str) -> str:

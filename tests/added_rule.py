@@ -1,6 +1,6 @@
 """A rule added to a copy of the package as docs/extending/rule.md says; as a program: what the copy says of it.
 
-The rule is ``4.change``: the ego keeps its lane state.
+The rule is ``4.change``: the ego keeps its lane state for ``change_time``.
 """
 
 from __future__ import annotations
@@ -28,6 +28,19 @@ CONFIG = {
     "duration": 10.0,
     "end_on_collision": False,
 }
+PARAMETER = '''    change_time: float = 60.0
+    """So long a lane state is kept."""
+'''
+LOOK = '''@jit_inline
+def judge_change(car: JudgedCar, lane: int, tick: int, terms: RefereeParameters, log: BreachLog) -> None:
+    """Judge rule 4: a lane state is kept for `change_time`; `lane` is the car's in this frame."""
+    if lane != car.lane:
+        if 0 <= lasted(tick, car.lane_since) < terms.change_ticks:
+            add(log, car, RULE.CHANGE, tick, car.lane_since, -1, lane)
+        car.lane_since = tick
+
+
+'''
 SEED = 2
 """Here the ego leaves its lane and the road, and hits an obstacle, if it weaves as below."""
 
@@ -44,9 +57,30 @@ def copy_with_rule(folder: Path, number: int) -> None:
     log = own / "rules" / "breach_log.py"
     _edit(log, r"    COLLISION: int = 0\n(    \w+: int = \d+\n)+", numbers)
     _edit(log, r"(?<=^RULES: Final\[tuple\[str, \.\.\.\]\] = )\([^)]*\)", repr(tuple(names)))
-    look = "    if lane != car.lane:\n        add(log, car, RULE.CHANGE, tick, tick, -1, lane)\n"
-    _edit(own / "rules" / "breaches.py", r"    if on:\n        car\.off_road = -1\n", rf"{look}\g<0>")
+    last = '    approach_since: int = -1\n    """Run of approaching a crossing, as of the frame before."""\n'
+    since = '    lane_since: int = -1\n    """Tick in which the lane state changed."""\n'
+    _edit(log, re.escape(last), last + since)
+    _edit(log, r"^    return_ticks: int\n", r"    change_ticks: int\n\g<0>")
+    _edit(
+        log,
+        r"^        own\.return_ticks = .*\n",
+        r"        own.change_ticks = ticks(given.change_time, rate)\n\g<0>",
+    )
+    _edit(own / "rules" / "parameters.py", r"^    crossing_degree: int = 3\n", f"{PARAMETER}\\g<0>")
+    _edit(own / "rules" / "breaches.py", r"^@jit_inline\ndef judge_road\(", f"{LOOK}\\g<0>")
+    kernel = own / "rules" / "referee_kernel.py"
+    _edit(kernel, r"(?<=import judge_)entry(?=, )", "change, judge_entry")
+    call = "    judge_change(car, lane, tick, tables.terms[b], log)\n"
+    _edit(kernel, r"^    judge_turn\(car, bits, lane, tick, log\)\n", rf"\g<0>{call}")
     _edit(own / "viewer" / "marks.py", r"^RULES = \{\n", rf'\g<0>    "{NAME}": "changes its lane",\n')
+
+
+def changed(folder: Path) -> set[str]:
+    """Return the files of the copy in a folder that are not as in the package, from there."""
+    package = Path(dubins_traffic.__file__).parent
+    own = folder / package.name
+    files = {path.relative_to(own) for path in own.rglob("*.py")}
+    return {path.as_posix() for path in files if (own / path).read_bytes() != (package / path).read_bytes()}
 
 
 def _edit(file: Path, pattern: str, text: str) -> None:

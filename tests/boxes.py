@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
 
 import dubins_traffic as dt
 from dubins_traffic.sandbox import BoxedController, Limits, available_layers, boxed_controller
+from tests import tools
 from tests.recordings import make_instance
 
-MISSING = available_layers().missing()
-needs_boxes = pytest.mark.skipif(
-    bool(MISSING) and os.environ.get("CI") != "true", reason=f"no boxes on this machine: {'; '.join(MISSING)}"
-)
-"""What skips a test where programs of strangers can't be held; under CI it goes on, and fails."""
+needs_boxes = pytest.mark.tools("boxes")
+
+
+def need() -> None:
+    """Skip the test where programs of strangers can't be held; under CI it fails."""
+    tools.need("; ".join(available_layers().missing()), "docs/sandbox.md says what boxes are made of")
+
 
 HEAD = """
 import os, sys, time, ctypes, socket, subprocess, threading

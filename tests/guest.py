@@ -15,12 +15,11 @@ import tempfile
 from collections.abc import Sequence
 from pathlib import Path
 
-import pytest
+from tests.tools import need
 
 ROOT = Path(__file__).parents[1]
 FOLDER = ROOT / "build" / "kernel"
 PROGRAM = "qemu-system-x86_64"
-REASON = f"needs {PROGRAM} and {FOLDER}; scripts/system-packages.sh and scripts/kernel.sh install them"
 MACHINE = "-accel tcg -cpu Nehalem -icount shift=0 -m 1G -nodefaults -no-user-config -display none -no-reboot"
 """No processor but the emulated one counts: it is the least that NumPy takes. An instruction lasts a nanosecond."""
 FILES = "local,path=/,mount_tag=machine,security_model=none,readonly=on,multidevs=remap"
@@ -61,10 +60,11 @@ echo $$ >/sys/fs/cgroup/user/session/cgroup.procs
 
 def require() -> None:
     """Leave the test out where there is no QEMU or no kernel for it; in continuous integration it fails."""
-    if shutil.which(PROGRAM) is None or not (FOLDER / "initrd").is_file():
-        if os.environ.get("CI") == "true":
-            pytest.fail(REASON)
-        pytest.skip(REASON)
+    here = shutil.which(PROGRAM) is not None and (FOLDER / "initrd").is_file()
+    need(
+        "" if here else f"{PROGRAM} or {FOLDER}",
+        "scripts/system-packages.sh and scripts/kernel.sh install it",
+    )
 
 
 def run(command: Sequence[str], situation: str, *, user: int = 0) -> tuple[int, str]:

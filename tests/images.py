@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 import io
-import os
-import shutil
 import subprocess
 import tarfile
 import tempfile
 from pathlib import Path
 
-import pytest
-
 from dubins_traffic.sandbox.images import OPTIONS
+from tests.tools import need_programs
 
-REASON = "needs podman and a compiler; scripts/system-packages.sh installs them"
 SOURCE = r"""#define _GNU_SOURCE
 #include <fcntl.h>
 #include <stdio.h>
@@ -56,10 +52,7 @@ int main(int count, char **words) {
 
 def require() -> None:
     """Leave a test out where no image can be made; in continuous integration it fails."""
-    if shutil.which("podman") is None or shutil.which("gcc") is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail(REASON)
-        pytest.skip(REASON)
+    need_programs("podman", "gcc", "strip")
 
 
 def program(folder: Path) -> Path:

@@ -11,12 +11,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
-
 from tests.ports import kept_port
+from tests.tools import need
 
 BINARIES = Path("/usr/lib/postgresql/15/bin")
-REASON = "needs postgresql-15; scripts/system-packages.sh installs it"
 USER = "nobody"
 
 
@@ -94,10 +92,7 @@ def cluster(disk: Path | None = None) -> Iterator[Cluster]:
     disk : Path, optional
         Where it keeps its data; the log is elsewhere.
     """
-    if not is_there():
-        if os.environ.get("CI") == "true":
-            pytest.fail(REASON)
-        pytest.skip(REASON)
+    need("" if is_there() else "postgresql-15", "scripts/system-packages.sh installs it")
     with tempfile.TemporaryDirectory(prefix="postgres-", ignore_cleanup_errors=True) as name:
         folder = Path(name)
         if os.geteuid() == 0:

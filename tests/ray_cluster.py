@@ -12,6 +12,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
+from tests.tools import need_module
+
 NODES = 3
 NOTICE: dict[str, Any] = {
     "health_check_initial_delay_ms": 1000,
@@ -61,6 +63,7 @@ def _there(stream: IO[str] | None) -> IO[str]:
 @contextmanager
 def running() -> Generator[RayCluster]:
     """Start a cluster, and stop it in the end."""
+    need_module("ray")
     arguments = [sys.executable, "-m", "tests.ray_cluster"]
     environment = {**os.environ, "RAY_USAGE_STATS_ENABLED": "0"}
     pipe = subprocess.PIPE

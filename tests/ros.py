@@ -16,12 +16,11 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 from dubins_traffic.transports.ros1.debian import DIST_PACKAGES
 from dubins_traffic.transports.ros1.master import answers
 from dubins_traffic.transports.ros1.messages import write_python
 from tests.ports import kept_port
+from tests.tools import need, need_programs
 
 ROOT = Path(__file__).resolve().parents[1]
 SYSTEM_PYTHON = "/usr/bin/python3"
@@ -32,20 +31,13 @@ PATIENCE = 600.0
 def need_ros() -> None:
     """Skip the test, or fail it under CI, where Debian's ROS packages are missing."""
     lacking = [name for name in ("rospy", "rosmaster", "roslib") if not Path(DIST_PACKAGES, name).is_dir()]
-    _need([*lacking, *(name for name in ("roscore", "g++") if shutil.which(name) is None)])
+    lacking += [name for name in ("roscore", "g++") if shutil.which(name) is None]
+    need(", ".join(lacking), "scripts/system-packages.sh installs it")
 
 
 def need_compiler() -> None:
     """Skip the test, or fail it under CI, where no program in C++ can be made."""
-    _need([name for name in ("make", "g++") if shutil.which(name) is None])
-
-
-def _need(lacking: Sequence[str]) -> None:
-    if lacking:
-        reason = f"{', '.join(lacking)}: not here; scripts/system-packages.sh installs it"
-        if os.environ.get("CI") == "true":
-            pytest.fail(reason)
-        pytest.skip(reason)
+    need_programs("make", "g++")
 
 
 class Graph:

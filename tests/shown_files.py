@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 from collections.abc import Callable
 from json import dumps
 from pathlib import Path
 from typing import Any
 
-import pytest
-
 import dubins_traffic as dt
 from dubins_traffic.problem.document import instance_to_document
-from dubins_traffic.sandbox.available import available_layers
-from tests import gazebo
+from tests import boxes, gazebo
 from tests.shown import ROOT
 from tests.tools import sumo_program
 
@@ -97,9 +93,8 @@ def file_of(path: str) -> Callable[[Path], None]:
 
 
 def need_boxes() -> None:
-    """Skip the test where programs of strangers can't be held; under CI it goes on, and fails."""
-    if (lacking := available_layers().missing()) and os.environ.get("CI") != "true":
-        pytest.skip(lacking[0])
+    """Skip the test where programs of strangers can't be held; under CI it fails."""
+    boxes.need()
 
 
 def towns() -> Path:
@@ -109,3 +104,7 @@ def towns() -> Path:
 
 def need_gazebo() -> None:
     gazebo.installation()
+
+
+def need_sumo() -> None:
+    towns()

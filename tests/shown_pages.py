@@ -37,6 +37,7 @@ from tests.shown_files import (
     files,
     need_boxes,
     need_gazebo,
+    need_sumo,
     recorded,
     short_demo,
     towns,
@@ -157,6 +158,7 @@ PAGES: dict[str, Page] = {
     ),
     "learning.md": Page(there=(clone("examples"),)),
     "maps.md": Page(
+        needs=(need_sumo,),
         there=(
             clone("examples/maps"),
             lambda folder: shutil.copy(towns() / "DRT" / "osm.net.xml", folder / "town.net.xml"),
@@ -186,7 +188,7 @@ PAGES: dict[str, Page] = {
     "task.md": Page(there=(clone("docs/pictures"),)),
     "theory.md": Page(
         there=(
-            clone("examples/solve_game.py", "benchmarks", "tests"),
+            clone("examples/solve_game.py", "benchmarks", "experiments", "tests"),
             files(**{"my-instance__json": dumps(SQUARE)}),
         ),
     ),

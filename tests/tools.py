@@ -1,7 +1,12 @@
-"""Other people's tools that some tests compare with; `scripts/crosscheck-tools.sh` installs them."""
+"""Tools that some tests need and `pip` does not bring, and those that `scripts/crosscheck-tools.sh` installs.
+
+Every test that asks for one carries the mark `tools`: `need` fails another one, also where the tool is there. So what
+`make test` runs, tests without the mark, needs nothing but Python.
+"""
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
 import shutil
@@ -18,6 +23,62 @@ import pytest
 
 FOLDER = Path(__file__).resolve().parents[1] / "build" / "crosscheck"
 PATIENCE_S = 600.0
+MARK = "tools"
+_running: list[pytest.Item] = []
+
+
+@contextmanager
+def running(item: pytest.Item) -> Iterator[None]:
+    """Say which test runs, until it has ended."""
+    _running.append(item)
+    try:
+        yield
+    finally:
+        _running.pop()
+
+
+def need(lacking: str, installed_by: str = "`make tools` installs it") -> None:
+    """Go on if nothing is lacking; else skip the test, or fail it under CI. A test without the mark always fails.
+
+    Parameters
+    ----------
+    lacking : str
+        What is not here, or does not work, for a person; empty if all is here.
+    installed_by : str
+        What would bring it, for a person.
+    """
+    if _running and _running[-1].get_closest_marker(MARK) is None:
+        pytest.fail(f"a test that asks for a tool carries the mark `{MARK}`, and this one does not")
+    if not lacking:
+        return
+    reason = f"{lacking}: not here, or does not start: {installed_by}"
+    if os.environ.get("CI") == "true":
+        pytest.fail(reason)
+    pytest.skip(reason)
+
+
+def need_programs(*names: str, installed_by: str = "scripts/system-packages.sh installs it") -> None:
+    """Go on if all these programs are here."""
+    need(", ".join(name for name in names if shutil.which(name) is None), installed_by)
+
+
+def need_module(name: str) -> None:
+    """Go on if a library of Python's can be loaded; one that needs a library of the system's counts as a tool."""
+    try:
+        importlib.import_module(name)
+    except ImportError as error:
+        need(f"{name} ({error})", "its extra and scripts/system-packages.sh install it")
+    else:
+        need("")
+
+
+def need_marked(item: pytest.Item) -> None:
+    """Look for the tools that the marks of a test name, before its fixtures: `pytest.mark.tools("boxes")`.
+
+    A name is that of a module here that has a function `need`.
+    """
+    for name in {str(name) for mark in item.iter_markers(MARK) for name in mark.args}:
+        importlib.import_module(f"tests.{name}").need()
 
 
 def interpreter_with(tool: str) -> str:
@@ -119,9 +180,5 @@ def _starts(path: str) -> bool:
 
 
 def _found(path: str, name: str) -> str:
-    if not Path(path).is_file():
-        reason = f"{name} is not here, or does not start: `make tools` installs it"
-        if os.environ.get("CI") == "true":
-            pytest.fail(reason)
-        pytest.skip(reason)
+    need("" if Path(path).is_file() else name)
     return path

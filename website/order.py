@@ -58,6 +58,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
         "design/index",
         "contributing",
         "benchmarks",
+        "experiments",
     ),
     "Gallery and results": ("gallery", "results"),
 }

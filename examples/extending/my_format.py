@@ -58,6 +58,10 @@ class GridMap:
         """Return the drawing of a network; InputError if it can't be drawn."""
         if document["version"] != 0:
             raise dt.InputError("can't be drawn", file=self.name, expected="straight roads on a lattice")
+        if others := document.keys() - {"version", "length", "transform", "shape", "segments"}:
+            raise dt.InputError(
+                "can't be drawn", file=self.name, value=sorted(others), expected="no other keys"
+            )
         segments: list[list[int]] = document["segments"]
         left, low = min(min(a, c) for a, _, c, _ in segments), min(min(b, d) for _, b, _, d in segments)
         if (

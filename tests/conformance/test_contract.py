@@ -34,7 +34,7 @@ SECONDS = 300.0 if FULL else None
 BLOCKS = {
     "before_obstacle": "an obstacle near to the end of a lane excuses who may lack the room to come back behind it",
 }
-"""Scenes in which e-agents that break nothing still block the ego."""
+"""Scenes in which e-agents that break nothing still block the ego, round a ring in no trial of the short run."""
 
 
 def _came(name: str) -> list[Came]:
@@ -49,9 +49,7 @@ def _came(name: str) -> list[Came]:
 def _marked(names: list[str], known: dict[str, str]) -> list[object]:
     """Return the names of scenes, those that are `known` to fail as such."""
     return [
-        pytest.param(name, marks=pytest.mark.xfail(reason=known[name], strict=False))
-        if name in known
-        else name
+        pytest.param(name, marks=pytest.mark.xfail(reason=known[name])) if name in known else name
         for name in names
     ]
 

@@ -1,6 +1,10 @@
+import pytest
+
 from dubins_traffic.simulators.gazebo.simulator import Gazebo
 from tests.conformance.simulator import SimulatorConformance
 from tests.gazebo import installation
+
+pytestmark = pytest.mark.tools
 
 
 class TestGazebo(SimulatorConformance):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
 
@@ -26,6 +27,7 @@ FORMATS = [*(name for name in registry.BUILT_IN if isinstance(registry.load(name
 GRID = RoadNetwork.grid(2, 3)
 NETWORKS = [
     GRID,
+    replace(GRID, extra={"author": "somebody", "mine": "unknown keys survive"}),
     RoadNetwork.grid(1, 2, 2.5),
     RoadNetwork(((0, 0, 0, 1), (0, 1, 1, 1), (1, 1, 2, 1)), 4.0, (0.0, 0.0, 0.0), (2, 3)),
     RoadNetwork.grid(3, 4, 3.25, (1.5, -2.0, 0.7)),

@@ -18,6 +18,7 @@ from tests.recordings import make_instance
 from tests.ros import need_ros
 
 pytestmark = [
+    pytest.mark.tools,
     pytest.mark.filterwarnings("ignore::DeprecationWarning"),
     pytest.mark.filterwarnings("ignore::ResourceWarning"),  # rospy leaves sockets to the collector
     pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning"),

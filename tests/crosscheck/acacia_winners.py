@@ -3,9 +3,13 @@
 It is no part of `make test`, since Acacia-Bonsai wants Python 3.13 (`scripts/crosscheck-tools.sh acacia`).
 """
 
+import pytest
+
 from dubins_traffic.synthesis.specification import specification_text
 from tests import foreign
 from tests.crosscheck.test_formula_tools import asked
+
+pytestmark = pytest.mark.tools
 
 
 def test_winners_are_those_of_acacia() -> None:

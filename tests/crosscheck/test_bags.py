@@ -16,6 +16,8 @@ from dubins_traffic.interchange.bag_reader import bag_to_records
 from dubins_traffic.interchange.bags import trial_data_path, typestore, write_bag
 from dubins_traffic.transports.ros1.messages import MD5
 
+pytestmark = pytest.mark.path
+
 rosbag1 = pytest.importorskip("rosbags.rosbag1")
 
 

@@ -3,10 +3,13 @@
 import math
 
 import numpy as np
+import pytest
 from shapely import LineString, Point, Polygon
 
 from dubins_traffic.cars.sensing import ray_box
 from dubins_traffic.kernels.boxes import NEVER, Box, corner, separation
+
+pytestmark = pytest.mark.path
 
 
 def random_box(rng):

@@ -3,11 +3,14 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from shapely import LineString, Point, Polygon, affinity, box
 
 from dubins_traffic.cars.body import Disc, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.scoring.clearance import Clearance, box_distance
 from tests.recordings import feed, make_instance, random_frames
+
+pytestmark = pytest.mark.path
 
 
 def placed(x: float, y: float, c: float, s: float, half_length: float, half_width: float):

@@ -13,6 +13,8 @@ from dubins_traffic.roads import lookup
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
 
+pytestmark = pytest.mark.path
+
 CHAINS = 50
 CASES = 200
 WIDE = 0.6

@@ -22,6 +22,8 @@ from dubins_traffic.logic.translation import until_and_release_only
 from tests.formulas import drawn
 from tests.tools import interpreter_with, program
 
+pytestmark = pytest.mark.tools
+
 HERE = Path(__file__).parent
 NAMES = ("a", "b")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from benchmarks.synthesis import request
+from experiments.synthesis import request
 
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
@@ -16,6 +16,8 @@ from dubins_traffic.synthesis.queues import WHO, Scene
 from dubins_traffic.synthesis.solver import solve
 from tests.games import ALL, board, pan
 from tests.tools import Solvers, solvers
+
+pytestmark = pytest.mark.tools
 
 SCRIPT = Path(__file__).with_name("omega_game.py")
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"

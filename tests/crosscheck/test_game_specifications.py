@@ -22,6 +22,8 @@ from dubins_traffic.synthesis.specification import specification_text
 from tests.games import ALL, board, pan
 from tests.tools import Solvers, solvers
 
+pytestmark = pytest.mark.tools
+
 
 def positions(some: Board, count: int) -> Iterator[tuple[list[int], int]]:
     """Yield cells of the cars and the position that they make, no two cars before one crossing."""

@@ -16,6 +16,8 @@ from tests.foreign_maps import BENT
 from tests.roadnets import winding
 from tests.tools import interpreter_with, sumo_program
 
+pytestmark = pytest.mark.tools
+
 HERE = Path(__file__).parent
 NETWORKS = {
     "grid": RoadNetwork.grid(3, 4, 3.25, (1.5, -2.0, 0.7)),

@@ -7,6 +7,8 @@ import subprocess
 from pathlib import Path
 from random import Random
 
+import pytest
+
 from dubins_traffic.logic.automaton import PRESUMABLY_FALSE, PRESUMABLY_TRUE, automaton
 from dubins_traffic.logic.formula import Bounds, Formula, Op, subformulas
 from dubins_traffic.logic.temporal import always, eventually
@@ -14,6 +16,8 @@ from dubins_traffic.logic.translation import until_and_release_only
 from tests.crosscheck.test_monitors_lasso import NAMES, verdicts
 from tests.formulas import drawn, drawn_past
 from tests.tools import interpreter_with, program
+
+pytestmark = pytest.mark.tools
 
 SCRIPT = Path(__file__).with_name("mona_acceptance.py")
 SIGNS = {Op.AND: "&", Op.OR: "|", Op.Z: "WY", Op.T: "P"}

@@ -18,6 +18,8 @@ from tests.crosscheck.test_monitors_lasso import NAMES, verdicts
 from tests.formulas import drawn
 from tests.tools import interpreter_with
 
+pytestmark = pytest.mark.tools
+
 SCRIPT = Path(__file__).with_name("spot_verdicts.py")
 STORM = Style(
     {Op.AND: "&", Op.OR: "|", Op.TRUE: '("a" | !"a")', Op.FALSE: '("a" & !"a")'},

@@ -16,6 +16,8 @@ from dubins_traffic.roads.network import RoadNetwork
 from tests.crosscheck.test_map_tools import NETWORKS, close, lanes_of
 from tests.tools import sumo_program
 
+pytestmark = pytest.mark.tools
+
 SHORTEST_CHORD = "0.02"
 """Metres; netconvert makes polylines of arcs."""
 MICROMETRE = 1.1e-6

@@ -13,6 +13,8 @@ from dubins_traffic.record import schema
 from dubins_traffic.record.writer import RecordWriter
 from tests.recordings import REALS, WHOLE, feed, make_instance, random_frames
 
+pytestmark = pytest.mark.path
+
 INSTANCE = make_instance(ticks=75)
 FRAMES = random_frames(INSTANCE, seed=2, count=76)
 

@@ -13,6 +13,8 @@ from dubins_traffic.roads.generate import generate, thinned_grid
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack
 
+pytestmark = pytest.mark.path
+
 HALF_WIDTH = 0.6
 CASES = 1_000
 NETWORKS = [

@@ -19,6 +19,8 @@ from dubins_traffic.rules.task import task
 from dubins_traffic.synthesis.foreign.hoa import read_hoa
 from tests.tools import Solvers, solvers
 
+pytestmark = pytest.mark.tools
+
 SCRIPT = Path(__file__).with_name("spot_formulas.py")
 
 

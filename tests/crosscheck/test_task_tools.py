@@ -137,6 +137,7 @@ def check_on_lassos(text: str, meant: Formula, random: Random) -> None:
 
 
 @pytest.mark.parametrize("name", ["demo", "mc-small-4grid-agents2"])
+@pytest.mark.tools
 def test_spin_reads_the_tasks_of_2016(spec: Spec, name: str) -> None:
     for number in range(3):
         text = spec(draw(load_config(name), 0, number), "--format", "spin").strip()
@@ -144,6 +145,7 @@ def test_spin_reads_the_tasks_of_2016(spec: Spec, name: str) -> None:
 
 
 @pytest.mark.parametrize("part", ["--assumption", "--guarantee"])
+@pytest.mark.tools
 def test_spin_reads_the_rules_as_they_are_meant(spec: Spec, town: Instance, part: str) -> None:
     """Each kind of part alone, since SPIN's automaton of a conjunction has a state for every subset of its parts.
 
@@ -162,6 +164,7 @@ def test_spin_reads_the_rules_as_they_are_meant(spec: Spec, town: Instance, part
 
 
 @pytest.mark.parametrize("part", [(), ("--assumption",), ("--guarantee",)])
+@pytest.mark.tools
 def test_rtamt_measures_the_task_on_a_recorded_trial(
     spec: Spec, small: Instance, tmp_path: Path, part: tuple[str, ...]
 ) -> None:
@@ -190,6 +193,7 @@ def test_rtamt_measures_the_task_on_a_recorded_trial(
         assert (answer[0] > 0) == bool((monitors.verdicts >= PRESUMABLY_TRUE).all())
 
 
+@pytest.mark.tools
 def test_tulip_finds_the_task_realizable_unless_the_ego_must_enter_whoever_is_ahead(
     spec: Spec, small: Instance
 ) -> None:

@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from benchmarks import towns
+from experiments import towns
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
@@ -21,8 +21,10 @@ from tests.minute import a_minute
 from tests.room import lacking
 from tests.tools import interpreter_with, sumo_program
 
+pytestmark = pytest.mark.tools
+
 TOWNS = {"DRT": 16_000.0, "bs3d": 5_600.0}
-"""Towns of `benchmarks.towns`, and the least metres with one lane in each direction in them."""
+"""Towns of `experiments.towns`, and the least metres with one lane in each direction in them."""
 LEAST = 0.85
 
 
@@ -69,7 +71,7 @@ def test_a_town_is_kept(town: str) -> None:
 
 @pytest.mark.parametrize(("town", "number"), [("DRT", 0), ("DRT", 2), ("bs3d", 0), ("bs3d", 1)])
 def test_rules_is_clean_there_among_lawful_cars(town: str, number: int) -> None:
-    """A sample of `benchmarks.towns`; in all but the last, cars once turned off their lanes where they left discs."""
+    """A sample of `experiments.towns`; in all but the last, cars once turned off their lanes where they left discs."""
     assert folder().is_dir()
     one = towns.drive(number, town, 60.0)
     assert (one.own, one.others, one.collisions) == ((), (), 0)

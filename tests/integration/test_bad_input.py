@@ -18,6 +18,8 @@ import pytest
 
 from dubins_traffic.cli.main import main
 
+pytestmark = pytest.mark.path
+
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 
 NETWORK: dict[str, Any] = {"version": 0, "length": 3, "transform": [0, 0, 0], "shape": [2, 2]}
@@ -527,7 +529,3 @@ def test_what_nobody_expected_is_one_line_too(monkeypatch, run_here):
     assert err.startswith("dubins-traffic: unexpected ValueError: two lines (")
     assert "--debug" in err
     assert err.count("\n") == 1
-
-
-def test_there_are_enough_kinds_of_bad_input():
-    assert len(DOCUMENTS) + len(OPTIONS) >= 40

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks.synthesized import Events, instance
+from experiments.synthesized import Events, instance
 
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.controllers.synthesized import STRATEGY_LEFT, Synthesized
@@ -26,6 +26,8 @@ from dubins_traffic.synthesis.sightings import Ground
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
 from tests.chain_reference import RING, SNAKE, Track
+
+pytestmark = pytest.mark.path
 
 BENT = {"random": {"intersections": 6, "segments": 7, "bent": 1.0, "rigid_motion": True}}
 ALL = ("E1", "E2", "E3", "E4", "E5", "E6")

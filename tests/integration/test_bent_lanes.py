@@ -18,6 +18,8 @@ from dubins_traffic.runs.single import run_trial
 from dubins_traffic.runs.sources import load_record
 from tests.chain_reference import RING, SNAKE, Track
 
+pytestmark = pytest.mark.path
+
 W = 0.3
 
 

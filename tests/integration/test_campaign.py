@@ -19,6 +19,7 @@ import pytest
 from pyarrow import parquet
 
 from tests.campaigns import campaign, command, logged, run, succeed, written
+from tests.tools import need
 
 TRIALS = 2 * 4 * 8
 
@@ -38,6 +39,7 @@ def kept(folder: Path) -> int:
     return sum(int(last) - int(first) + 1 for first, last in names)
 
 
+@pytest.mark.path
 def test_the_number_of_workers_does_not_show(tmp_path: Path, table: bytes) -> None:
     assert succeed(written(tmp_path, campaign()), tmp_path / "out", "--workers", "2") == table
 
@@ -147,12 +149,13 @@ def small_disk(tmp_path: Path) -> Iterator[Path]:
     place = tmp_path / "disk"
     place.mkdir()
     mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)]
-    if os.geteuid() != 0 or subprocess.run(mount, check=False, capture_output=True).returncode != 0:
-        pytest.skip("needs the right to mount a file system")
+    refused = os.geteuid() != 0 or subprocess.run(mount, check=False, capture_output=True).returncode
+    need("the right to mount" if refused else "", "it takes root, on a machine that allows mounts")
     yield place
     subprocess.run(["umount", str(place)], check=True)
 
 
+@pytest.mark.tools
 def test_a_full_disk_keeps_what_is_finished(tmp_path: Path, small_disk: Path, table: bytes) -> None:
     file, out = written(tmp_path, campaign()), small_disk / "out"
     done = run(file, out, "--workers", "2")

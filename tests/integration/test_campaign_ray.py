@@ -17,7 +17,8 @@ from dubins_traffic.runs import ray_crew, ray_driver
 from tests import ray_cluster
 from tests.campaigns import campaign, command, logged, run, succeed, written
 
-pytest.importorskip("ray")
+pytestmark = pytest.mark.tools
+
 
 DOCUMENT = campaign(controllers=["controllers.py:Slow", "simple"], trials=12)
 TRIALS = 2 * 4 * 12

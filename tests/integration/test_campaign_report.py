@@ -5,7 +5,6 @@ from __future__ import annotations
 import csv
 import html
 import json
-import os
 import re
 import statistics
 from collections.abc import Iterator
@@ -30,7 +29,7 @@ from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.scoring.columns import REPORTED, SCORES
-from tests.browser import CHROMIUM, DRIVER, browsing
+from tests.browser import browsing
 from tests.campaigns import campaign, written
 
 TEN = {
@@ -104,6 +103,7 @@ def test_means_medians_and_differences_are_those_of_the_table(folder: Path) -> N
             assert (int(line["count"]), int(line["of"])) == (sum(excused), len(excused))
 
 
+@pytest.mark.path
 def test_controllers_are_ranked_by_counted_rounds(folder: Path) -> None:
     found = rows(folder)
     for row in found:
@@ -157,9 +157,7 @@ def test_the_same_folder_gives_the_same_bytes(folder: Path, tmp_path: Path) -> N
         assert (tmp_path / name).read_bytes() == path.read_bytes(), name
 
 
-@pytest.mark.skipif(
-    (CHROMIUM is None or DRIVER is None) and os.environ.get("CI") != "true", reason="needs chromium"
-)
+@pytest.mark.tools("browser")
 def test_the_page_in_a_browser(folder: Path, browser: webdriver.Chrome) -> None:
     browser.get((folder / "report" / "index.html").as_uri())
     assert browser.title == DOCUMENT["name"]
@@ -176,9 +174,7 @@ def test_the_page_in_a_browser(folder: Path, browser: webdriver.Chrome) -> None:
     assert browser.get_log("browser") == []
 
 
-@pytest.mark.skipif(
-    (CHROMIUM is None or DRIVER is None) and os.environ.get("CI") != "true", reason="needs chromium"
-)
+@pytest.mark.tools("browser")
 def test_the_page_is_dark_where_it_should_be_and_nothing_scrolls_sideways(
     folder: Path, browser: webdriver.Chrome
 ) -> None:

@@ -9,14 +9,16 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from scripts.reference import renewed
 
 from dubins_traffic.cli.main import main
-from dubins_traffic.cli.reference import renewed
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import shipped_names
 from dubins_traffic.problem.kinds import KINDS
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.runs import catalogue
+
+pytestmark = pytest.mark.path
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "documents.md"
 
@@ -77,7 +79,7 @@ def test_all_of_it_as_json(subject, capsys):
 def test_the_page_is_up_to_date():
     page = PAGE.read_text(encoding="utf-8")
     assert page.count("<!-- generated: ") == 3
-    command = "python -m dubins_traffic.cli.reference docs/documents.md"
+    command = "python -m scripts.reference docs/documents.md"
     assert renewed(page) == page, f"run `{command}`"
     assert command in page
     assert all(f"| `{own.name}` | {own.shown} |" in page for own in catalogue.rules())

@@ -24,6 +24,7 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.transports.ros1.debian import DIST_PACKAGES
 from dubins_traffic.transports.ros1.messages import write_python
 from tests.ros import SYSTEM_PYTHON, need_ros
+from tests.tools import need_module
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
@@ -104,6 +105,7 @@ def test_the_course_is_odd() -> None:
     assert any(not instance.e_agents for instance in instances.values())
 
 
+@pytest.mark.path
 def test_a_good_controller_passes(faulty: str, capsys: pytest.CaptureFixture[str]) -> None:
     status = main(["check-controller", f"{faulty}:Good", "--json"])
     found: dict[str, Any] = json.loads(capsys.readouterr().out)
@@ -215,15 +217,17 @@ def assert_well(out: str) -> None:
     assert out.count("ok ") + len(failed) == 7
 
 
+@pytest.mark.tools
 def test_over_lcm_a_program_is_started_and_ended(capsys: pytest.CaptureFixture[str]) -> None:
-    pytest.importorskip("lcm")
+    need_module("lcm")
     command = f"{sys.executable} {ROOT / 'examples' / 'lcm' / 'controller.py'}"
     main(["check-controller", command, "--over", "lcm"])
     assert_well(capsys.readouterr().out)
 
 
+@pytest.mark.tools
 def test_a_command_that_ignores_ctrl_c_lets_the_program_hear_it() -> None:
-    pytest.importorskip("lcm")
+    need_module("lcm")
     command = f"{sys.executable} {ROOT / 'examples' / 'lcm' / 'controller.py'}"
     deaf = [
         "sh",
@@ -239,6 +243,7 @@ def test_a_command_that_ignores_ctrl_c_lets_the_program_hear_it() -> None:
     assert_well(subprocess.run(deaf, check=False, capture_output=True, text=True, timeout=600).stdout)
 
 
+@pytest.mark.tools
 def test_over_ros1_a_node_is_started_and_ended(tmp_path: Path) -> None:
     need_ros()
     write_python(tmp_path)
@@ -262,9 +267,10 @@ def noted(order: list[str], name: str) -> Callable[..., Any]:
     return call
 
 
+@pytest.mark.tools
 def test_over_lcm_a_program_that_ends_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """All that trials need is compiled before the program is started: its patience is not ours to spend."""
-    pytest.importorskip("lcm")
+    need_module("lcm")
     order: list[str] = []
     for name in ("rehearse", "_start"):
         monkeypatch.setattr(over_transport, name, noted(order, name))

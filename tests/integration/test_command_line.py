@@ -92,6 +92,7 @@ def scores(text: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.path
 def test_help_shows_examples_of_the_command(command, run):
     text = run(command, "--help")
     assert "Examples" in text
@@ -102,6 +103,7 @@ def test_help_without_a_command(run):
     assert all(f" {command} " in run(status=2) for command in COMMANDS)
 
 
+@pytest.mark.path
 def test_version(run):
     import dubins_traffic
 
@@ -147,6 +149,7 @@ def test_output_goes_to_a_file_whole(run, place):
     assert [path.name for path in place.iterdir() if path.name.startswith(".")] == []
 
 
+@pytest.mark.path
 def test_conversion_there_and_back(run, place):
     run("network", "--intersections", "9", "--segments", "10", "-o", "a.json")
     run("convert", "a.json", "-o", "b.rnd")
@@ -194,6 +197,7 @@ def test_a_trial_is_the_instance_of_its_seed_and_number(run, place):
         assert (place / f"b{trial}" / name).read_bytes() == (place / "a" / name).read_bytes()
 
 
+@pytest.mark.path
 def test_json_of_a_run(run):
     sheet = json.loads(run("run", CONFIG, "--trials", "2", "--seed", "1", "--records", "out/in", "--json"))
     assert sheet["icra2016_sum"] == sum(trial["icra2016"] for trial in sheet["trials"])
@@ -208,6 +212,7 @@ def test_json_of_a_run(run):
     assert json.loads(run("run", CONFIG, "--json"))["trials"][0]["record"] is None
 
 
+@pytest.mark.path
 def test_two_jobs_leave_the_same_bytes_as_one(run, place):
     ask = ["run", CONFIG, "--trials", "3", "--controller", "mine.py:Straight", "--json"]
     one = scores(run(*ask, "--records", "one"))
@@ -219,6 +224,7 @@ def test_two_jobs_leave_the_same_bytes_as_one(run, place):
         assert (place / "one" / name).read_bytes() == (place / "two" / name).read_bytes()
 
 
+@pytest.mark.path
 def test_scores_of_records_are_those_of_the_run(run):
     live = json.loads(run("run", CONFIG, "--trials", "2", "--records", "out", "--json"))
     records = [trial["record"] for trial in live["trials"]]
@@ -280,6 +286,7 @@ def test_another_network_for_a_configuration(run):
     assert TrialData.read("data.json").instances[0]["rnd"]["shape"] == [2, 2]
 
 
+@pytest.mark.path
 def test_a_fault_ends_its_own_trial_only(capsys):
     code = main(["run", "demo", "--seed", "1", "--controller", "mine.py:Faulty", "--json"])
     out, err = capsys.readouterr()
@@ -298,6 +305,7 @@ def test_a_late_controller_ends_its_trial(run):
     assert sheet["trials"][0]["end"] == "deadline"
 
 
+@pytest.mark.path
 def test_records_become_tables(run):
     run("run", CONFIG, "--controller", "simple", "--records", "out")
     run("convert", "out/trial-0000.mcap", "-o", "a.csv")
@@ -347,6 +355,7 @@ def test_a_reader_that_has_enough_is_no_error():
 
 
 @pytest.mark.parametrize("subject", list(listing.Subject))
+@pytest.mark.path
 def test_lists(subject, run):
     lines = [line for line in run("list", subject).splitlines() if line[0] != " "]
     assert lines

@@ -152,6 +152,7 @@ def test_what_is_finished_is_kept_on_a_full_disk(tmp_path: Path) -> None:
     assert evaluate(phase, submission, tmp_path / "two") == whole
 
 
+@pytest.mark.path
 def test_a_trial_that_can_not_be_drawn_is_no_fault_of_the_submission(tmp_path: Path) -> None:
     full = {**SHORT, "e-agents": [{"type": "lawful", "name": "car", "count": 90}]}
     found = competition(
@@ -273,6 +274,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
 
 
 @needs_boxes
+@pytest.mark.tools
 def test_the_templates_pass_as_they_are_and_drive_alike(tmp_path: Path) -> None:
     need_compiler()
     write_template("python", tmp_path / "python")
@@ -356,6 +358,7 @@ def test_evaluating_needs_no_extra(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("name", ["python", "cpp", "competition"])
+@pytest.mark.path
 def test_templates_are_whole_and_spoil_nothing(tmp_path: Path, name: str) -> None:
     paths = write_template(name, tmp_path / "new")
     assert all(path.read_text() for path in paths)

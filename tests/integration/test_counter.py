@@ -1,10 +1,10 @@
-"""Counterstrategies played on the road; `benchmarks.counter` shows them at length."""
+"""Counterstrategies played on the road; `experiments.counter` shows them at length."""
 
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from benchmarks.counter import CASES, Case, Drive, drive, instance
+from experiments.counter import CASES, Case, Drive, drive, instance
 
 from dubins_traffic.agents.counter import COUNTERSTRATEGY
 from dubins_traffic.engine.batch import outcomes

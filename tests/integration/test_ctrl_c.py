@@ -139,6 +139,7 @@ from dubins_traffic.cli.__main__ import main
 
 
 @pytest.mark.parametrize("module", ["dubins_traffic.cli.main", "threading", "dubins_traffic.runs"])
+@pytest.mark.path
 def test_before_the_program_listens(module: str) -> None:
     done = ran(BEFORE_IT_LISTENS, module)
     assert (done.returncode, done.stdout, done.stderr) == (

@@ -40,6 +40,7 @@ def jobs(folder, order):
     return [Job(k, 5, "lanes", configuration=demo, record=folder / f"{k}.mcap") for k in order]
 
 
+@pytest.mark.path
 def test_order_and_processes_do_not_change_a_byte(tmp_path) -> None:
     bytes_of = []
     for name, order, workers in (("a", [0, 1, 2, 3], 1), ("b", [3, 1, 0, 2], 1), ("c", [0, 1, 2, 3], 2)):
@@ -63,6 +64,7 @@ def test_compiled_and_interpreted_records_are_equal(tmp_path, name, controller) 
 
 
 @pytest.mark.parametrize("theta", [0.5, 2.0, -2.9])
+@pytest.mark.path
 def test_a_rigid_motion_of_the_network_commutes_with_the_whole_trial(theta) -> None:
     here = draw(load_config("demo"), 11, 0)
     c, s = sincos(theta)

@@ -52,6 +52,7 @@ def typed() -> list[str]:
 
 
 @pytest.mark.parametrize("line", typed())
+@pytest.mark.path
 def test_a_command_of_a_page_can_be_read(line: str) -> None:
     command: Any = typer.main.get_command(app)
     words = shlex.split(re.split(r" (?:\||2?>|&&) ", line)[0])[1:]
@@ -76,6 +77,7 @@ def named() -> list[str]:
 
 
 @pytest.mark.parametrize("line", named())
+@pytest.mark.path
 def test_a_command_that_a_page_names_exists(line: str) -> None:
     command: Any = typer.main.get_command(app)
     for word in line.split()[1:]:
@@ -84,6 +86,7 @@ def test_a_command_that_a_page_names_exists(line: str) -> None:
             command = command.commands[word]
 
 
+@pytest.mark.path
 def test_for_every_page_it_is_known_where_its_code_is_run() -> None:
     with_code = {name for name, block in SHOWN if block.runs and not {"not run", "run by"} & {*block.marks}}
     followed = {*PAGES} | {name for page in PAGES.values() for name in page.with_pages}
@@ -92,6 +95,7 @@ def test_for_every_page_it_is_known_where_its_code_is_run() -> None:
         assert (Path(__file__).parent / test).is_file()
 
 
+@pytest.mark.path
 def test_what_is_run_elsewhere_or_not_at_all_says_where_and_why() -> None:
     for name, block in SHOWN:
         if where := block.marks.get("run by"):
@@ -101,6 +105,7 @@ def test_what_is_run_elsewhere_or_not_at_all_says_where_and_why() -> None:
     assert len([block for _, block in SHOWN if "not run" in block.marks]) <= MOST_NOT_RUN
 
 
+@pytest.mark.path
 def test_no_command_hides_where_no_test_looks_for_it() -> None:
     for name, path in all_pages().items():
         assert COMMAND.findall(path.read_text(encoding="utf-8")) == [], name
@@ -108,6 +113,7 @@ def test_no_command_hides_where_no_test_looks_for_it() -> None:
     assert {block.language for _, block in SHOWN} <= known
 
 
+@pytest.mark.path
 def test_the_site_shows_nothing_of_what_pages_say_to_the_tests(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -128,6 +134,7 @@ def test_the_site_shows_nothing_of_what_pages_say_to_the_tests(
         if block.language in {"toml", "xml"}
     ],
 )
+@pytest.mark.path
 def test_a_document_of_a_page_can_be_read(block: Block) -> None:
     if block.language == "toml":
         assert tomllib.loads(block.code)
@@ -135,7 +142,10 @@ def test_a_document_of_a_page_can_be_read(block: Block) -> None:
         assert len(ElementTree.fromstring(block.code))
 
 
-@pytest.mark.parametrize("name", sorted(PAGES))
+@pytest.mark.parametrize(
+    "name",
+    [pytest.param(name, marks=pytest.mark.tools) if PAGES[name].needs else name for name in sorted(PAGES)],
+)
 def test_the_code_of_a_page_runs(name: str, tmp_path: Path) -> None:
     page = PAGES[name]
     for need in page.needs:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -59,8 +58,8 @@ for line in json.load(open(sys.argv[1])):
 """Runs commands one after the other, and says of each how it ended and whether the files are those from before."""
 
 
-ROS = Path(DIST_PACKAGES, "genpy").is_dir() or os.environ.get("CI") == "true"
-"""Whether messages of ROS 1 can be made here, or have to."""
+ROS = Path(DIST_PACKAGES, "genpy").is_dir()
+"""Whether messages of ROS 1 can be made here."""
 
 
 class Asked(NamedTuple):

@@ -141,6 +141,7 @@ def test_a_shrunk_case_loses_its_breach_with_any_one_thing_less(found: Path, tmp
     assert dt.run_trial(dt.load_instance(tmp_path / "small.json"), "simple").score.verdict is not None
 
 
+@pytest.mark.path
 def test_commands_find_shrink_and_run_cases_again(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = tmp_path / "found"
     arguments = ["--controller", "simple", "--rule", "3.stop", "--trials", "16", "--duration", "6", "-o"]
@@ -238,6 +239,7 @@ def test_an_event_of_one_in_a_million_is_estimated_with_fifty_thousand_trials() 
     assert 3.0**-13 / (2 if FULL else 6) <= np.mean(found) <= 3.0**-13 * (1.5 if FULL else 6)
 
 
+@pytest.mark.path
 def test_monte_carlo_counts_what_the_judge_says() -> None:
     from dubins_traffic.falsification.crew import Here
     from dubins_traffic.falsification.sampling import prepared

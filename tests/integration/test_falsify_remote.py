@@ -24,6 +24,7 @@ from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.transports.lines_client import drive
 from tests.boxes import needs_boxes, written
 from tests.ros import Graph, finish, graph, need_ros
+from tests.tools import need_module
 
 UNHURRIED = "deadline=600,begin=600"
 ASKED = {"trials": 8, "seed": 3, "duration": 6.0, "rules": ["3.stop", "1.road"]}
@@ -148,8 +149,9 @@ def test_a_program_elsewhere_drives_one_trial_at_a_time(tmp_path: Path) -> None:
         dt.falsify("junction", driver, tmp_path / "found", trials=4, workers=2)
 
 
+@pytest.mark.tools
 def test_a_program_over_lcm_is_searched(tmp_path: Path) -> None:
-    pytest.importorskip("lcm")
+    need_module("lcm")
     from dubins_traffic.transports.lcm.client import Driver
     from tests.conformance.test_lcm import free_url
 
@@ -174,6 +176,7 @@ def ros(tmp_path: Path) -> Iterator[Graph]:
         yield made
 
 
+@pytest.mark.tools
 def test_a_node_over_ros_is_searched_and_its_cases_run_again(ros: Graph, tmp_path: Path) -> None:
     command = [sys.executable, "-m", "dubins_traffic.cli"]
     over = ["--over", f"ros1,{UNHURRIED}"]
@@ -202,8 +205,9 @@ def test_a_controller_in_a_box_is_searched_shrunk_and_run_again(tmp_path: Path) 
     assert not any(own.passed for own in regress(tmp_path / "found", spec))
 
 
+@pytest.mark.tools
 def test_a_search_on_ray_leaves_the_bytes_of_one_here(tmp_path: Path) -> None:
-    pytest.importorskip("ray")
+    need_module("ray")
     asked = {"trials": 48, "seed": 1, "duration": 6.0}
     dt.falsify("junction", "simple", tmp_path / "here", **asked)
     dt.falsify("junction", "simple", tmp_path / "there", **asked, ray="local", workers=2)

@@ -6,11 +6,13 @@ import os
 import sys
 from pathlib import Path
 
+import pytest
+
 from dubins_traffic.competition.templates import write_template
-from tests.browser import browsing, need_browser
+from tests.browser import browsing
 from tests.first_submission import TEAM, first_place, served
 
-need_browser()
+pytestmark = pytest.mark.tools("browser")
 
 
 def test_from_the_commands_of_the_page_to_the_first_place(tmp_path: Path) -> None:

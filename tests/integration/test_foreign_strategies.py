@@ -35,6 +35,7 @@ def strategies(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     return foreign.files(tmp_path_factory.mktemp("strategies"))
 
 
+@pytest.mark.path
 def test_all_formats_answer_alike(strategies: dict[str, Path]) -> None:
     start_of_other = foreign.starts_of(foreign.instance())[1]
     words = [(start_of_other, *rest) for rest in product(range(4), repeat=3)]
@@ -282,6 +283,7 @@ def damaged() -> list[tuple[str, str | bytes, str]]:
 @pytest.mark.parametrize(
     ("data", "message"), [case[1:] for case in damaged()], ids=[case[0] for case in damaged()]
 )
+@pytest.mark.path
 def test_damaged_files_are_refused(data: str | bytes, message: str, tmp_path: Path) -> None:
     path = tmp_path / "strategy"
     path.write_bytes(data if isinstance(data, bytes) else data.encode())

@@ -34,6 +34,9 @@ from dubins_traffic.verification.contacts import from_poses
 from tests.batches import pose, scene
 from tests.gazebo import installation
 from tests.recordings import make_instance
+from tests.tools import need
+
+pytestmark = pytest.mark.tools
 
 PROGRAM = [sys.executable, "-m", "dubins_traffic.cli"]
 WANDERERS = {
@@ -378,8 +381,9 @@ def test_roads_are_worlds_that_others_can_read(tmp_path: Path) -> None:
     new = subprocess.run(
         [sys.executable, "-c", ask, str(tmp_path / "1.9.sdf")], capture_output=True, text=True, check=False
     )
-    if "cannot open shared object" in new.stderr and os.environ.get("CI") != "true":
-        pytest.skip("libsdformat12 is not here: scripts/gazebo.sh installs it")
+    need(
+        "libsdformat12" if "cannot open shared object" in new.stderr else "", "scripts/gazebo.sh installs it"
+    )
     assert new.stdout.strip() == "Valid."
     assert new.returncode == 0, new.stderr
 

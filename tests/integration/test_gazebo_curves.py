@@ -22,6 +22,8 @@ from dubins_traffic.simulators.gazebo.world import world
 from tests.batches import pose
 from tests.gazebo import installation
 
+pytestmark = pytest.mark.tools
+
 CONFIGURATION = {
     "version": 1,
     "problem_domain": "dubins_traffic",

@@ -18,6 +18,7 @@ import typer
 from dubins_traffic.cli.commands import app
 from tests.ports import kept_port
 from tests.ros import PATIENCE, ROOT, Graph, configuration, graph, need_ros, read_until
+from tests.tools import need_module
 
 
 def commands(group: Any) -> Iterator[Any]:
@@ -34,6 +35,7 @@ def examples() -> list[str]:
 
 
 @pytest.mark.parametrize("line", examples())
+@pytest.mark.path
 def test_an_example_can_be_read(line: str) -> None:
     command: Any = typer.main.get_command(app)
     words = shlex.split(line.partition(" | ")[0].partition(" > ")[0])
@@ -44,17 +46,22 @@ def test_an_example_can_be_read(line: str) -> None:
     command.make_context(words[0] if words else "", words, parent=context)
 
 
-SESSIONS = [line for line in examples() if re.match(r"(ros1|ros2|lcm|lines) run ", line)]
+SESSIONS = [
+    pytest.param(line, marks=pytest.mark.tools) if line.startswith(("ros1", "lcm")) else line
+    for line in examples()
+    if re.match(r"(ros1|ros2|lcm|lines) run ", line)
+]
 
 
 @pytest.mark.parametrize("line", SESSIONS)
+@pytest.mark.path
 def test_an_example_of_a_session_runs_and_says_what_it_does(line: str, tmp_path: Path) -> None:
     """It compiles, says where it is and what it waits for, and ends as asked."""
     kind = line.partition(" ")[0]
     if kind == "ros1":
         need_ros()
-    elif kind != "lines":
-        pytest.importorskip({"lcm": "lcm", "ros2": "cyclonedds"}[kind])
+    elif kind == "lcm":
+        need_module("lcm")
     configuration(tmp_path).rename(tmp_path / "my-trials.json")
     own_core = kind == "ros1" and "--master" not in line
     with graph(tmp_path, core=own_core) as ros:
@@ -77,6 +84,7 @@ def test_an_example_of_a_session_runs_and_says_what_it_does(line: str, tmp_path:
     assert order == sorted(order)
 
 
+@pytest.mark.tools
 def test_the_launch_file_works_as_typed(tmp_path: Path) -> None:
     need_ros()
     text = (ROOT / "docs" / "attach.md").read_text(encoding="utf-8")

@@ -17,6 +17,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.record.reader import read
 from dubins_traffic.runs.single import run_trial
+from tests.tools import need_module
 
 COMMAND = [sys.executable, "-m", "dubins_traffic.cli"]
 CONFIG: dict[str, Any] = {
@@ -218,6 +219,7 @@ FAULTY = {
 
 
 @pytest.mark.parametrize("name", FAULTY)
+@pytest.mark.path
 def test_whatever_a_controller_raises_ends_its_trial_alone_and_in_batches(name):
     single = run_trial(instance(), f"hostile.py:{name}").ending
     assert single.end == "controller_fault"
@@ -309,6 +311,7 @@ NONSENSE: dict[str, Callable[[], Any]] = {
 
 
 @pytest.mark.parametrize("kind", NONSENSE)
+@pytest.mark.path
 def test_an_answer_that_is_nonsense_is_a_fault(kind):
     class Talks:
         def start(self, problem: object) -> None: ...
@@ -415,10 +418,13 @@ configurations = ["small.json"]
 """
 
 
-@pytest.mark.parametrize("engine", [["--workers", "1"], ["--ray", "local", "--workers", "1"]])
+@pytest.mark.parametrize(
+    "engine",
+    [["--workers", "1"], pytest.param(["--ray", "local", "--workers", "1"], marks=pytest.mark.tools)],
+)
 def test_a_campaign_goes_on_where_controllers_exit(engine, place):
     if engine[0] == "--ray":
-        pytest.importorskip("ray")
+        need_module("ray")
     pyarrow = pytest.importorskip("pyarrow.parquet")
     (place / "c.toml").write_text(CAMPAIGN)
     done = outside("campaign", "run", "c.toml", "-o", "out", *engine)

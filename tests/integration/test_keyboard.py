@@ -22,6 +22,8 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.runs.single import Trial
 
+pytestmark = pytest.mark.path
+
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 
 

@@ -38,6 +38,7 @@ run_trial(instance, Paced(), record=sys.argv[1])
 
 @pytest.mark.parametrize("rate", [30.0, 0.0], ids=["real time", "full speed"])
 @pytest.mark.parametrize("last", [51, 93])
+@pytest.mark.path
 def test_a_killed_run_leaves_a_record_up_to_its_last_second(tmp_path: Path, rate: float, last: int) -> None:
     record = tmp_path / "killed.mcap"
     period = 1 / rate if rate else 0.0

@@ -1,9 +1,9 @@
-"""A sample of `benchmarks.lanes`, which shows the bar on 200 instances."""
+"""A sample of `experiments.lanes`, which shows the bar on 200 instances."""
 
 import statistics
 
 import pytest
-from benchmarks.lanes import Drive, drive
+from experiments.lanes import Drive, drive
 
 SAMPLE = 20
 

@@ -22,6 +22,8 @@ from tests.conformance.test_lcm import free_url
 from tests.conformance.transport import frames
 from tests.tools import program
 
+pytestmark = pytest.mark.tools
+
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 PATIENT = ("--lockstep", "--deadline", "600", "--begin", "600")

@@ -18,6 +18,8 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.observations.flat import Layout
 from dubins_traffic.scoring.score import Score
 
+pytestmark = pytest.mark.path
+
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "learning"
 PAGE = ROOT / "docs" / "learning.md"

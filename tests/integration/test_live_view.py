@@ -11,9 +11,10 @@ import pytest
 from selenium.webdriver.support.wait import WebDriverWait
 
 from dubins_traffic.viewer.live import LiveView, png
-from tests.browser import browsing, need_browser
+from tests.browser import browsing
 
-need_browser()
+pytestmark = pytest.mark.tools("browser")
+
 COLOUR = """const c = document.createElement("canvas").getContext("2d");
 c.drawImage(document.querySelector("img"), 0, 0); return Array.from(c.getImageData(3, 3, 1, 1).data)"""
 

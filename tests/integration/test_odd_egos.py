@@ -1,7 +1,7 @@
-"""A sample of `benchmarks.odd_egos`, whose bar is 2,000 trials: no odd ego brings a lawful car to a breach."""
+"""A sample of `experiments.odd_egos`, whose bar is 2,000 trials: no odd ego brings a lawful car to a breach."""
 
 import pytest
-from benchmarks.odd_egos import NAMES, Oddity, kind_of, trial
+from experiments.odd_egos import NAMES, Oddity, kind_of, trial
 
 SECONDS = 60.0
 SAMPLE = tuple(range(28, 28 + len(NAMES)))
@@ -25,7 +25,6 @@ def odd() -> list[Oddity]:
 
 def test_every_kind_of_ego_is_in_the_sample() -> None:
     assert {NAMES[kind_of(number)] for number in SAMPLE} == set(NAMES)
-    assert len(NAMES) >= 10
 
 
 def test_odd_egos_are_clean(odd: list[Oddity]) -> None:

@@ -101,6 +101,7 @@ def test_a_command_replaces_nothing_that_it_was_not_told_to(
 
 
 @pytest.mark.parametrize("form", [[], ["--cpp"]])
+@pytest.mark.tools
 def test_messages_for_ros_replace_nothing_unasked(
     form: list[str], place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -160,6 +161,7 @@ def test_a_mistyped_folder_holds_nothing_to_go_on_with(
     assert not (place / "mistyped").exists()
 
 
+@pytest.mark.path
 def test_two_outputs_are_two_files(place: Path, capsys: pytest.CaptureFixture[str]) -> None:
     before = held(place)
     assert main(["synth", "one.json", "-o", "a.npz", "--graph", "a.npz"]) == 2
@@ -232,6 +234,7 @@ def test_what_is_read_is_never_written(place: Path) -> None:
     require_output("/dev/null", "a record", [".mcap"])
 
 
+@pytest.mark.path
 def test_every_command_that_writes_a_file_may_be_told_to_replace_it() -> None:
     """Folders have rules of their own: what was begun in one is gone on with."""
     found = options_of(typer.main.get_command(app))

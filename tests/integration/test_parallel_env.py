@@ -83,6 +83,7 @@ def driven(env: Any, seed: int, steps: int = 10**6, bias: float = 0.5) -> list[A
         {"ego": "rules", "learned": ["a1"], "frame_skip": 5},
     ],
 )
+@pytest.mark.path
 def test_pettingzoo_finds_nothing_wrong_with_the_parallel_environment(more: dict[str, Any]) -> None:
     parallel_api_test(parallel_env(config(seconds=3.0), **more), 100)
     parallel_api_test(Shielded(parallel_env(config(seconds=3.0), **more)), 100)
@@ -112,6 +113,7 @@ def test_equal_seeds_give_equal_streams_for_500_steps_and_in_the_next_episode(sh
     [{}, {"ego": "lanes"}, {"ego": "rules", "learned": ["a1"]}, {"frame_skip": 4, "learned": ["a0", "a2"]}],
 )
 @pytest.mark.parametrize("shielded", [False, True])
+@pytest.mark.path
 def test_run_trial_makes_the_frames_of_an_episode_again(more: dict[str, Any], shielded: bool) -> None:
     env: Any = parallel_env(config(seconds=12.0), **more)
     env = Shielded(env) if shielded else env

@@ -118,6 +118,7 @@ def test_process_substitution():
         "score x.mcap --json",
     ],
 )
+@pytest.mark.path
 def test_a_reader_that_has_had_enough_is_no_error(command):
     run_trial(draw(load_config(CONFIG), 0, 0), "simple", record="x.mcap")
     for reader in ("true", "head -1"):

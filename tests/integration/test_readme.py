@@ -108,6 +108,7 @@ def test_the_controller_on_the_page_on_batches_drives_alike_alone():
         assert run_trial(outcome.instance, made["Keeper"]()).score.driven == outcome.score.driven
 
 
+@pytest.mark.path
 def test_a_controller_takes_ten_lines():
     (controller,) = [text for text in blocks("python") if FILE_NAME.match(text)]
     code = [line for line in controller.splitlines() if line.strip() and not line.startswith("#")]
@@ -115,11 +116,13 @@ def test_a_controller_takes_ten_lines():
 
 
 @pytest.mark.parametrize("target", ["demo", "test", "check", "bench"])
+@pytest.mark.path
 def test_make_targets_are_named_and_exist(target):
     assert f"make {target}" in README
     assert re.search(rf"^{target}:.*## ", (ROOT / "Makefile").read_text(), re.MULTILINE)
 
 
+@pytest.mark.path
 def test_links_lead_somewhere():
     for target in re.findall(r"\]\(([^)#]+)\)", README):
         assert "://" in target or (ROOT / target).exists(), target

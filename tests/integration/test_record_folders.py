@@ -94,6 +94,7 @@ def contents(folder: Path) -> dict[str, bytes]:
 
 
 @pytest.mark.parametrize("first", [RUN, BATCH])
+@pytest.mark.path
 def test_a_folder_that_holds_records_is_refused_and_left(first, call, place):
     assert call(*first)[:2] == (0, [0, 1, 2])
     before = contents(place / "out")

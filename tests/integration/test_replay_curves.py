@@ -12,9 +12,11 @@ from selenium.webdriver.support.wait import WebDriverWait
 from dubins_traffic.cli.main import main
 from dubins_traffic.record.reader import read
 from dubins_traffic.roads.network import RoadNetwork
-from tests.browser import browsing, need_browser
+from tests.browser import browsing
 from tests.integration.test_gazebo_curves import CONFIGURATION
 from tests.pages import press
+
+pytestmark = pytest.mark.tools("browser")
 
 COLOURS = """
 const at = arguments[0], origin = JSON.parse(document.getElementById('data').textContent).origin;
@@ -28,8 +30,6 @@ return at.map(([x, y]) => {
 """
 """The colours at places of the world."""
 ROAD, LINE = (0xCD, 0xD1, 0xD7), (0xFF, 0xFF, 0xFF)
-
-need_browser()
 
 
 def inner(network: RoadNetwork, s: int, offset: float) -> np.ndarray:

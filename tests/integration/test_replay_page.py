@@ -18,9 +18,11 @@ from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer.marks import Mark
 from dubins_traffic.viewer.replay import write_replay
-from tests.browser import browsing, need_browser
+from tests.browser import browsing
 from tests.pages import ask, element, has_colour, press
 from tests.synthetic import ROUGH, driven, instance, obstacles_beside, verdict
+
+pytestmark = pytest.mark.tools("browser")
 
 FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
@@ -28,8 +30,6 @@ FLAGS = (
 )
 NASTY = "</script><script>window.broken = true</script>"
 PICTURE = "return document.getElementById('map').toDataURL()"
-
-need_browser()
 
 
 @pytest.fixture(scope="module")

@@ -23,7 +23,7 @@ from dubins_traffic.transports.ros1.master import pid_at
 from dubins_traffic.transports.ros1.messages import MD5, load
 from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, lines, need_ros, read_until
 
-pytestmark = pytest.mark.filterwarnings("ignore::DeprecationWarning")
+pytestmark = [pytest.mark.tools, pytest.mark.filterwarnings("ignore::DeprecationWarning")]
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -13,9 +13,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+import pytest
+
 import dubins_traffic as dt
 from dubins_traffic.record.sink import End
 from tests.ros import PATIENCE, ROOT, SYSTEM_PYTHON, configuration, finish, graph, lines, need_ros, read_until
+
+pytestmark = pytest.mark.tools
 
 TRIALS = int(os.environ.get("DUBINS_TRAFFIC_TRIALS_2016", "5"))
 LARGE = {"version": 0, "length": 3, "transform": [0, 0, 0], "shape": [40, 40]}

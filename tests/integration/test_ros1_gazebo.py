@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import pytest
+
 import dubins_traffic as dt
 from dubins_traffic.record.sink import End
 from tests.gazebo import installation
 from tests.ros import configuration, finish, graph, lines, need_ros
+
+pytestmark = pytest.mark.tools
 
 
 def test_a_client_of_2016_drives_a_car_with_wheels(tmp_path: Path) -> None:

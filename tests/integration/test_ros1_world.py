@@ -12,6 +12,8 @@ from dubins_traffic.record.sink import End
 from dubins_traffic.sessions.plan import rehearse
 from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, need_ros
 
+pytestmark = pytest.mark.tools
+
 COURSE = {
     "duration": 3.0,
     "number_trials": 1,

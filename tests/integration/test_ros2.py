@@ -25,7 +25,7 @@ from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
 from tests.conformance.transport import frames
 from tests.ros2_client import READY, RESET, RESTART, START, Client, law
-from tests.tools import program
+from tests.tools import need, program
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
@@ -107,6 +107,7 @@ def test_peers_are_counted_while_others_come_and_go(domain: int) -> None:
         graph.close()
 
 
+@pytest.mark.path
 def test_process_to_process(domain: int, config: str, tmp_path: Path) -> None:
     expected, instance = reference(config, tmp_path)
     arguments = (
@@ -154,14 +155,15 @@ def test_process_to_process(domain: int, config: str, tmp_path: Path) -> None:
 def fastdds(tmp_path_factory: pytest.TempPathFactory) -> str:
     """A driver of another implementation of DDS, built with Debian's libfastrtps-dev."""
     compiler = program("g++")
-    if not Path("/usr/include/fastdds/dds/domain/DomainParticipant.hpp").exists():
-        pytest.skip("libfastrtps-dev is not here: scripts/system-packages.sh installs it")
+    here = Path("/usr/include/fastdds/dds/domain/DomainParticipant.hpp").exists()
+    need("" if here else "libfastrtps-dev", "scripts/system-packages.sh installs it")
     built = tmp_path_factory.mktemp("dds") / "fastdds"
     source = ROOT / "tests" / "dds" / "fastdds.cpp"
     subprocess.run([compiler, "-std=c++17", "-Wall", "-Werror", "-o", built, source, *LIBRARIES], check=True)
     return str(built)
 
 
+@pytest.mark.tools
 def test_fast_dds_drives_the_ego(fastdds: str, domain: int, config: str, tmp_path: Path) -> None:
     expected, instance = reference(config, tmp_path)
     arguments = (

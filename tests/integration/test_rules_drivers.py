@@ -1,7 +1,7 @@
-"""A sample of `benchmarks.rules`, which shows the bars on 1,000 trials and more."""
+"""A sample of `experiments.rules`, which shows the bars on 1,000 trials and more."""
 
 import pytest
-from benchmarks.rules import Drive, drive
+from experiments.rules import Drive, drive
 
 SAMPLE = 12
 

@@ -1,4 +1,4 @@
-"""Searches find planted faults soon, without being told which; `python -m benchmarks.falsify` asks for all twelve."""
+"""Searches find planted faults soon, without being told which; `python -m experiments.falsify` asks for all twelve."""
 
 import math
 import os

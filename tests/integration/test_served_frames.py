@@ -14,12 +14,14 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benchmarks.competition import ROADS, RULES, SWERVES
+from experiments.competition import ROADS, RULES, SWERVES
 
 from dubins_traffic.competition.templates import write_template
 from dubins_traffic.service.client import packed
 from tests.ros import need_compiler
 from tests.services import COMMAND, Person, Service, serving, wait_until
+
+pytestmark = pytest.mark.tools("boxes")
 
 TRIALS = int(os.environ.get("DUBINS_TRAFFIC_SERVED_TRIALS", "12"))
 LONGEST_S = 600.0 + 60.0 * TRIALS

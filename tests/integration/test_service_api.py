@@ -79,6 +79,7 @@ def test_a_fuzzer_finds_no_fault_of_ours(service: Service, organiser: Person, pe
     assert "POST /worker/lease" in met
 
 
+@pytest.mark.path
 def test_a_participant_at_a_terminal(service: Service, person: Person, tmp_path: Path) -> None:
     entry = tmp_path / "entry"
     entry.mkdir()

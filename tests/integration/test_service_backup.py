@@ -10,13 +10,15 @@ from pathlib import Path
 import pytest
 
 from tests.services import PASSWORD, STANDING, competition_text, serving
+from tests.tools import need_programs
+
+pytestmark = pytest.mark.tools
 
 PAGE = Path(__file__).parents[2] / "docs" / "competitions" / "organisers.md"
 
 
 def test_what_was_backed_up_is_there_again(tmp_path: Path) -> None:
-    if shutil.which("sqlite3") is None:
-        pytest.skip("needs sqlite3, the command")
+    need_programs("sqlite3")
     found = re.search(r"```bash\n(sqlite3 season.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
     assert found is not None
     (tmp_path / "short.toml").write_text(competition_text())

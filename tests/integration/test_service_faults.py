@@ -32,6 +32,8 @@ from tests.seasons import (
 )
 from tests.services import STANDING, Person, answers, shown_secret, wait_until
 
+pytestmark = pytest.mark.tools
+
 NUMBERS = itertools.count()
 TEAMS = max(2, FAULTS // 3)
 """So many that no chunk loses its worker so often that it is given up."""

@@ -15,6 +15,8 @@ from tests.disks import fill, small_disk
 from tests.seasons import FAULTS, SETTINGS, counted_once, kept_whole, offered, season, sent
 from tests.services import STANDING, Person, wait_until
 
+pytestmark = pytest.mark.tools
+
 DISKS = 3 if FAULTS >= 20 else 1
 REPLAY_ROOM = 16 << 10
 """Bytes into which a controller of these tests fits, but no replay."""

@@ -6,9 +6,13 @@ import io
 import zipfile
 from pathlib import Path
 
+import pytest
+
 from tests import images
 from tests.boxes import needs_boxes
 from tests.seasons import SETTINGS, season
+
+pytestmark = pytest.mark.tools("boxes")
 
 
 @needs_boxes

@@ -12,15 +12,15 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.browser import browsing, need_browser
+from tests.browser import browsing
 from tests.services import CRASHING, PASSWORD, STANDING, Service, competition_text, serving
+
+pytestmark = pytest.mark.tools("browser")
 
 AXE = Path(__file__).parents[1] / "vendor" / "axe.min.js"
 NASTY = "<img src=x onerror=window.broken=1>"
 WAIT_S = 600
 PHONE, DESKTOP = (390, 844), (1280, 900)
-
-need_browser()
 
 
 @pytest.fixture(scope="module")

@@ -18,8 +18,7 @@ from tests import ray_cluster
 from tests.seasons import FAULTS, SETTINGS, counted_once, database_of, launched, season
 from tests.services import STANDING, shown_secret, wait_until
 
-if os.environ.get("CI") != "true":
-    pytest.importorskip("ray")
+pytestmark = pytest.mark.tools
 
 TEAMS = max(2, FAULTS // 3)
 

@@ -14,6 +14,8 @@ from tests import s3
 from tests.seasons import SETTINGS, counted_once, kept_whole, offered, season, sent
 from tests.services import STANDING, Person, wait_until
 
+pytestmark = pytest.mark.tools
+
 PLACE = f"s3://{s3.BUCKET}/here"
 S3_SETTINGS = f'{SETTINGS}storage = "{PLACE}"\n'
 LITTLE = 2000

@@ -25,6 +25,8 @@ from dubins_traffic.service.tables import Phase, Submission, Trial
 from tests import postgres
 from tests.services import CRASHING, Person, competition_text, serving, wait_until
 
+pytestmark = pytest.mark.tools
+
 SAID = "swordfish"
 SAYING = f"""
 class Controller:

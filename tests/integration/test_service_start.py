@@ -71,6 +71,7 @@ def later(path: Path) -> None:
         database.execute("UPDATE alembic_version SET version_num = '9999'")
 
 
+@pytest.mark.tools
 def test_tables_of_a_later_version_in_postgresql(tmp_path: Path) -> None:
     import psycopg
 

@@ -14,10 +14,12 @@ import pytest
 
 from tests.ports import kept_port
 from tests.services import STANDING, Person, competition_text, serving, wait_until
+from tests.tools import need
+
+pytestmark = pytest.mark.tools
 
 NGINX, OPENSSL = shutil.which("nginx", path="/usr/sbin:/usr/bin"), shutil.which("openssl")
 PAGE = Path(__file__).parents[2] / "docs" / "competitions" / "organisers.md"
-REASON = "needs nginx and openssl; scripts/system-packages.sh installs them"
 
 
 def proxy_file(folder: Path, port: int, upstream: str) -> Path:
@@ -42,10 +44,7 @@ def proxy_file(folder: Path, port: int, upstream: str) -> Path:
 
 
 def test_people_and_clients_come_by_https(tmp_path: Path) -> None:
-    if NGINX is None or OPENSSL is None:
-        if os.environ.get("CI") == "true":
-            pytest.fail(REASON)
-        pytest.skip(REASON)
+    need("" if NGINX and OPENSSL else "nginx or openssl", "scripts/system-packages.sh installs them")
     subprocess.run(
         [OPENSSL, "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-days", "1", "-subj", "/CN=localhost",
          "-addext", "subjectAltName=DNS:localhost", "-keyout", "cert.key", "-out", "cert.pem"],

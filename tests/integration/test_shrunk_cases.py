@@ -16,7 +16,7 @@ CASES = sorted((Path(__file__).parents[1] / "cases").rglob("*.json"))
 MOST = 3
 """Cars, the ego counted."""
 FRESH = 4
-"""So many cases of a fresh search are shrunk here; `python -m benchmarks shrinking` takes 40, of all drivers."""
+"""So many cases of a fresh search are shrunk here; `python -m experiments shrinking` takes 40, of all drivers."""
 
 
 @pytest.mark.parametrize("path", CASES, ids=[f"{path.parent.name}-{path.stem}" for path in CASES])

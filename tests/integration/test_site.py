@@ -18,7 +18,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from dubins_traffic.campaign.report.statistics import share
 from dubins_traffic.suites.suite import load_suite, shipped_suites
-from tests.browser import browsing, need_browser
+from tests.browser import browsing
 
 ROOT = Path(__file__).parents[2]
 FETCHES = {"link": "href", "script": "src", "img": "src", "iframe": "src", "source": "src", "object": "data"}
@@ -163,11 +163,11 @@ def test_the_numbers_of_the_results_are_those_of_the_files(site: Path) -> None:
 
 @pytest.fixture(scope="module")
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
-    need_browser()
     with browsing(tmp_path_factory.mktemp("profile"), traffic=True) as driver:
         yield driver
 
 
+@pytest.mark.tools("browser")
 def test_the_search_works_from_a_file(site: Path, browser: webdriver.Chrome) -> None:
     browser.get(f"{(site / 'search.html').as_uri()}?q=overtaking")
     WebDriverWait(browser, 600).until(
@@ -179,6 +179,7 @@ def test_the_search_works_from_a_file(site: Path, browser: webdriver.Chrome) -> 
     "name",
     ["index", "rules", "gallery", "results", "tutorials/first-controller", "reference/api/trials"],
 )
+@pytest.mark.tools("browser")
 def test_a_page_asks_for_files_beside_it_alone(name: str, site: Path, browser: webdriver.Chrome) -> None:
     browser.get("about:blank")
     for kind in ("performance", "browser"):

@@ -11,6 +11,8 @@ import pytest
 
 import dubins_traffic
 
+pytestmark = pytest.mark.path
+
 HEAVY = ("numba", "llvmlite", "matplotlib", "pandas", "pyarrow", "scipy", "mcap")
 SMALLEST = """
 import sys

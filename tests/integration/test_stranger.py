@@ -8,6 +8,8 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+import pytest
+
 from tests.integration.test_readme import ROOT
 from tests.integration.test_tutorials import follow
 from tests.tools import interpreter_with
@@ -44,6 +46,7 @@ def installed(folder: Path) -> dict[str, str]:
     return around | {"PATH": f"{programs}{os.pathsep}{around['PATH']}"}
 
 
+@pytest.mark.path
 def test_the_first_page_leads_there() -> None:
     """It installs what `installed` does, and links to each step; the last one names its program."""
     page = (ROOT / "website" / "index.md").read_text(encoding="utf-8")
@@ -56,6 +59,7 @@ def test_the_first_page_leads_there() -> None:
     assert "python examples/foreign_synthesis.py --tulip " in last
 
 
+@pytest.mark.tools
 def test_the_path_of_a_stranger(tmp_path: Path) -> None:
     around = installed(tmp_path)
     for name in STEPS:

@@ -248,6 +248,7 @@ def test_ctrl_c_keeps_the_answers_that_are_there(tmp_path: Path) -> None:
     assert result(tmp_path / "out") == result(tmp_path / "again")
 
 
+@pytest.mark.path
 def test_suites_are_listed_and_shown(tmp_path: Path) -> None:
     listed = run("list").stdout
     for name in ("icra2016", "rules-2026", "synthesis-2026"):

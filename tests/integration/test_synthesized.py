@@ -1,11 +1,11 @@
-"""Strategies played on the road; `benchmarks.synthesized` shows the bars on 2,000 trials."""
+"""Strategies played on the road; `experiments.synthesized` shows the bars on 2,000 trials."""
 
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from benchmarks.synthesized import Drive, Events, drive, instance
+from experiments.synthesized import Drive, Events, drive, instance
 
 from dubins_traffic.controllers import registry
 from dubins_traffic.controllers.synthesized import STRATEGY_LEFT, Synthesized
@@ -74,6 +74,7 @@ def test_where_the_strategy_does_not_win_the_ego_keeps_the_rules() -> None:
     assert Counter(kind for _, kind, _ in events.found)[STRATEGY_LEFT] == 1
 
 
+@pytest.mark.path
 def test_a_saved_strategy_drives_as_one_that_is_found_at_the_start(tmp_path: Path) -> None:
     own = instance(3, 60.0)
     path = tmp_path / "own.npz"

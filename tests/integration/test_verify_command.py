@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from benchmarks.verify import CONTROLLERS, WAYS, case, verified
+from experiments.verify import CONTROLLERS, WAYS, case, verified
 
 import dubins_traffic as dt
 from dubins_traffic.campaign.run_campaign import run_campaign
@@ -71,6 +71,7 @@ def test_records_of_runs_batches_and_campaigns_are_verified(run: Run, config: Pa
         assert run("verify", *records).splitlines() == [f"{path}: verified" for path in records]
 
 
+@pytest.mark.path
 def test_one_line_a_record_and_the_exit_status(run: Run, record: Path) -> None:
     data = record.read_bytes()
     Path("bad.mcap").write_bytes(rebuilt(data, put(schema.FRAMES, 40, "x", 0, 0.0, 3)))
@@ -227,7 +228,7 @@ def test_a_controller_that_kills_its_process_leaves_what_can_be_verified(config:
 
 
 def test_records_of_all_kinds_are_verified(tmp_path: Path) -> None:
-    """`python -m benchmarks.verify 500` is the whole of it."""
+    """`python -m experiments.verify 500` is the whole of it."""
     accepted, refused, _ = verified(36, tmp_path)
     assert refused == []
     assert accepted.total() == 36

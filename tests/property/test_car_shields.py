@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from benchmarks.drawing import random_roads, random_trial
-from benchmarks.shield_hostile import KINDS, Hostile
+from experiments.drawing import random_roads, random_trial
+from experiments.shield_hostile import KINDS, Hostile
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

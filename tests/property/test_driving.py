@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from experiments.free_flow import free_flow
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -23,7 +24,6 @@ from dubins_traffic.policies.rules.tables import Vehicle
 from dubins_traffic.policies.safety import motion_is_safe
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.routing.rounds import round_time
 from dubins_traffic.routing.tours import LaneGraph, Round, find_round
 

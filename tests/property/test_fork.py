@@ -11,8 +11,8 @@ from typing import Any, Self
 
 import numpy as np
 import pytest
-from benchmarks.counter import Case
-from benchmarks.counter import instance as counter_instance
+from experiments.counter import Case
+from experiments.counter import instance as counter_instance
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 

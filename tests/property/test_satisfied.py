@@ -8,12 +8,12 @@ from itertools import pairwise
 from pathlib import Path
 
 import pytest
+from experiments.free_flow import free_flow
 
 from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.record.reader import Record, read
-from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import score

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from benchmarks.shield import KINDS, ruled, trials
+from experiments.shield import KINDS, ruled, trials
 from hypothesis import given, settings, target
 from hypothesis import strategies as st
 

@@ -24,7 +24,9 @@ from dubins_traffic.sandbox.launch import staged
 from dubins_traffic.sandbox.layers import BOX, CLOCK, FILES, MEMORY, NAMES, PROCESSES, SECCOMP
 from dubins_traffic.sandbox.submission import interpreter
 from dubins_traffic.sandbox.suite import strike, strikes
-from tests.boxes import MISSING, needs_boxes
+from tests.boxes import needs_boxes
+
+pytestmark = pytest.mark.tools
 
 USER = 65533
 as_root = pytest.mark.skipif(os.getuid() != 0, reason="only root becomes another user")
@@ -165,7 +167,7 @@ def test_a_kernel_that_forbids_namespaces_is_told_of_in_one_line() -> None:
 
 
 def test_where_no_box_can_be_made_strangers_are_refused() -> None:
-    if not MISSING:
+    if not available_layers().missing():
         boxed_controller("simple").close()
         return
     with pytest.raises(InputError):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import stat
 import subprocess
 import textwrap
@@ -19,6 +18,7 @@ from dubins_traffic.sandbox import Limits, boxed_controller
 from tests.boxes import driven, needs_boxes, written
 from tests.conformance.transport import frames
 from tests.recordings import make_instance
+from tests.tools import need_programs
 
 pytestmark = needs_boxes
 HOMING = f"{Path(__file__).parents[2] / 'examples' / 'controller.py'}:Homing"
@@ -170,8 +170,9 @@ def test_a_program_that_speaks_lines_drives(tmp_path: Path) -> None:
     assert result.ending.end is End.DURATION
 
 
-@pytest.mark.skipif(shutil.which("g++") is None, reason="there is no g++")
+@pytest.mark.tools
 def test_a_program_in_cpp_with_threads_drives(tmp_path: Path) -> None:
+    need_programs("g++")
     source = tmp_path / "drive.cc"
     source.write_text(
         textwrap.dedent("""\

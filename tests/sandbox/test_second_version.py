@@ -10,6 +10,8 @@ import pytest
 
 from tests import guest
 
+pytestmark = pytest.mark.tools
+
 ATTACKS = os.environ.get("DUBINS_TRAFFIC_ATTACKS", "memory of many processes,processes").split(",")
 """``all`` runs every attack, for hours."""
 PLACES = {

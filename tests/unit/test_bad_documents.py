@@ -12,7 +12,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.document import load_instance
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.files import Kind, detect_text
+from dubins_traffic.problem.files import Kind, detect
 from dubins_traffic.problem.trial_data import TrialData
 
 Document = dict[str, Any]
@@ -355,8 +355,4 @@ def _written(folder: Path, document: Document) -> Path:
     ],
 )
 def test_documents_are_told_apart_by_content(document: Document, kind: Kind) -> None:
-    assert detect_text(json.dumps(document)) is kind
-
-
-def test_a_network_in_plain_text_is_told_from_json() -> None:
-    assert detect_text("# a road\nversion: 0\nlength: 5\nshape: 2 2\n") is Kind.NETWORK
+    assert detect(document) is kind

@@ -8,16 +8,15 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
+from scripts.schemas import ID, shipped
 
 from dubins_traffic.campaign.campaign import Campaign, load_campaign, seed_of
 from dubins_traffic.campaign.chunks import LEAST_CAR_STEPS, MOST_CAR_STEPS, Pace, cost
 from dubins_traffic.campaign.folder import remaining
-from dubins_traffic.campaign.schema import campaign_schema, shipped_campaign_schema
 from dubins_traffic.campaign.settings import put, raised, scalar, vary
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.schema import ID, schema_text, shipped_schema
 
 BASE: dict[str, Any] = {
     "version": 0,
@@ -192,11 +191,10 @@ def test_what_is_not_toml_is_named(tmp_path: Path) -> None:
         load_campaign(path)
 
 
-def test_the_shipped_schema_is_up_to_date_and_agrees() -> None:
-    schema = shipped_campaign_schema()
-    assert schema_text(campaign_schema()) == schema_text(schema)
+def test_the_shipped_schema_agrees() -> None:
+    schema = shipped("campaign", "campaign")
     Draft202012Validator.check_schema(schema)
-    parts = [(ID + "configuration", Resource.from_contents(shipped_schema("configuration")))]
+    parts = [(ID + "configuration", Resource.from_contents(shipped("configuration")))]
     validator = Draft202012Validator(schema, registry=Registry().with_resources(parts))
     good = {
         **BASE,

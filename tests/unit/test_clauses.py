@@ -16,7 +16,14 @@ ANCHORS = re.findall(r'<a id="([^"]+)"></a>', (ROOT / PAGE).read_text(encoding="
 CITED = re.compile(r"rules\.md#([\w.-]*\w)")
 LINK = re.compile(r"\]\(([^)\s:#]*)#([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.*)$", re.MULTILINE)
-PLACES = {"src": "*.py", "docs": "*.md", "tests": "*.py", "benchmarks": "*.py", "examples": "*.py"}
+PLACES = {
+    "src": "*.py",
+    "docs": "*.md",
+    "tests": "*.py",
+    "benchmarks": "*.py",
+    "experiments": "*.py",
+    "examples": "*.py",
+}
 
 
 def sources() -> list[Path]:

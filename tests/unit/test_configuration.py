@@ -12,7 +12,9 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 from jsonschema.exceptions import ValidationError
+from scripts.schemas import MAKE, place, schemas, shipped, text
 
+import dubins_traffic as dt
 from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
@@ -23,7 +25,6 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.files import dumps, write_document
 from dubins_traffic.problem.instance import Laser
 from dubins_traffic.problem.kinds import KINDS, kind_of, parameters_of
-from dubins_traffic.problem.schema import schema_text, schemas, shipped_schema
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
 from tests.unit import test_bad_documents as bad
@@ -264,14 +265,17 @@ def test_a_network_that_was_named_by_path_is_written_in(named: dict[str, Any], t
         assert "network" not in document
         assert Configuration.from_document(document).network == config.network
     assert config.to_document() == bad.base(**named)
-    Draft202012Validator(shipped_schema("configuration")).validate(config.to_document())
+    Draft202012Validator(shipped("configuration")).validate(config.to_document())
 
 
-@pytest.mark.parametrize("name", ["network", "configuration", "instance", "trial-data"])
-def test_shipped_schemas_are_valid_and_up_to_date(name: str) -> None:
-    schema = shipped_schema(name)
-    Draft202012Validator.check_schema(schema)
-    assert schema_text(schemas()[name]) == schema_text(schema)
+def test_shipped_schemas_are_valid_and_up_to_date() -> None:
+    made = schemas()
+    assert len(made) == 8
+    for where, schema in made.items():
+        Draft202012Validator.check_schema(schema)
+        assert place(*where).read_text(encoding="utf-8") == text(schema), f"{place(*where)}: run `{MAKE}`"
+    package = Path(dt.__file__).parent
+    assert {place(*where) for where in made} == set(package.glob("*/schemas/*.json"))
 
 
 def test_valid_documents_agree_with_the_schemas() -> None:
@@ -285,7 +289,7 @@ def test_valid_documents_agree_with_the_schemas() -> None:
     documents += [("instance", json.loads((GOLDEN / "instance-3x4.json").read_text()))]
     documents += [("configuration", bad.base(laser=True, rules={"tickets": 1}, ego={"start": [1, 0, 0]}))]
     for name, document in documents:
-        Draft202012Validator(shipped_schema(name)).validate(document)
+        Draft202012Validator(shipped(name)).validate(document)
 
 
 # What JSON Schema can't say: relations between values, likeness of keys, and 1.0 where an integer is asked.
@@ -313,7 +317,7 @@ RELATIONS = {
     ],
 )
 def test_invalid_documents_agree_with_the_schemas(schema: str, name: str, document: Any) -> None:
-    validator = Draft202012Validator(shipped_schema(schema))
+    validator = Draft202012Validator(shipped(schema))
     if name in RELATIONS:
         assert name in {case[0] for case in [*bad.CONFIGURATIONS, *bad.INSTANCES, *bad.TRIAL_DATA]}
         return

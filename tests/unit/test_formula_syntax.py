@@ -159,10 +159,6 @@ def test_refuses_with_line_and_column(text: str, line: int, column: int) -> None
     assert error.expected
 
 
-def test_there_are_sixty_malformed_formulas() -> None:
-    assert len({text for text, _, _ in MALFORMED}) == len(MALFORMED) >= 60
-
-
 def test_errors_keep_their_place_when_they_are_placed_in_a_document() -> None:
     with pytest.raises(InputError) as caught:
         parse("a &&")

@@ -1,3 +1,4 @@
+import os
 import shutil
 from pathlib import Path
 from xml.etree import ElementTree
@@ -13,7 +14,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.simulators import registry
-from dubins_traffic.simulators.gazebo import packages, prefix
+from dubins_traffic.simulators.gazebo import install, prefix
 from dubins_traffic.simulators.gazebo.export import Version, to_sdf
 from dubins_traffic.simulators.gazebo.roads import MARKER
 from dubins_traffic.simulators.gazebo.vehicle import TRACK, WHEEL_RADIUS, Drive
@@ -122,9 +123,31 @@ def test_only_gazebo_has_a_window() -> None:
         registry.load("embedded", show=True)
 
 
-def test_mirrors_are_those_of_this_machine(monkeypatch: pytest.MonkeyPatch) -> None:
-    if shutil.which("apt-get") is not None:
-        assert all("://" in mirror and "/dists" not in mirror for mirror in packages.mirrors())
-    monkeypatch.setenv("PATH", "/nowhere")
-    with pytest.raises(InputError, match="no apt-get"):
-        packages.mirrors()
+def test_a_machine_without_apt_is_told_of(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "bin").mkdir()
+    (tmp_path / "bin" / "bash").symlink_to(str(shutil.which("bash")))
+    monkeypatch.setenv("PATH", str(tmp_path / "bin"))
+    with pytest.raises(InputError, match=r"no apt-get; expected Debian .* gzserver") as error:
+        install.fetch_packages(tmp_path / "prefix", print)
+    assert error.value.file == str(tmp_path / "prefix")
+
+
+def test_what_a_program_of_apt_says_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An apt that knows a mirror which has no such suite: it is tried, named, and nothing is unpacked."""
+    said: list[tuple[str, float]] = []
+    (tmp_path / "bin").mkdir()
+    apt = tmp_path / "bin" / "apt-get"
+    apt.write_text(
+        '#!/bin/sh\ncase "$*" in *print-uris*) echo "\'http://mirror.example/debian/dists/x/InRelease\' a 0" ;;\n'
+        "*) echo 'E: no such release' >&2; exit 100 ;; esac\n"
+    )
+    (tmp_path / "bin" / "dpkg-deb").write_text("#!/bin/sh\nexit 1\n")
+    for path in (tmp_path / "bin").iterdir():
+        path.chmod(0o755)
+    monkeypatch.setenv("PATH", f"{tmp_path / 'bin'}:{os.environ['PATH']}")
+    with pytest.raises(InputError, match=r"gives bullseye \(E: no such release\)"):
+        install.fetch_packages(tmp_path / "prefix", lambda *told: said.append(told))
+    assert said == [("list of packages", 0.0)]
+    sources = (tmp_path / "prefix" / "apt" / "sources.list").read_text()
+    assert "http://mirror.example/debian bullseye main" in sources
+    assert list((tmp_path / "prefix" / "root").iterdir()) == []

@@ -3,7 +3,7 @@
 import json
 from pathlib import Path
 
-from benchmarks.falsify import Hits, at_least, code_of_searches, enough, spread
+from experiments.falsify import Hits, at_least, code_of_searches, enough, spread
 
 
 def test_the_median_is_known_to_be_above_the_cap_if_six_of_ten_were_given_up() -> None:

@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from dubins_traffic.competition.contents import Bounds
-from dubins_traffic.competition.submission import check_submission, load_submission
+from dubins_traffic.competition.submission import check_submission
 from dubins_traffic.errors import InputError
 
 CONTROLLER = b"class Controller:\n    pass\n"
@@ -60,7 +60,6 @@ def test_a_file_a_folder_and_an_archive_of_the_same_are_the_same(tmp_path: Path)
         check_submission(archive({f"entry-main/{name}": data for name, data in files.items()}), store)
         == found
     )
-    assert load_submission(store, found.digest) == found
     assert [path.name for path in store.iterdir()] == [found.digest]
     alone = check_submission(folder / "controller.py", store)
     assert stored(alone.path) == {"controller.py": CONTROLLER, "controller.toml": ALONE}
@@ -208,13 +207,3 @@ def test_what_can_not_be_written_whole_leaves_nothing(tmp_path: Path) -> None:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     assert list(tmp_path.iterdir()) == []
     assert isinstance(error.value.__cause__, OSError)
-
-
-def test_a_store_that_was_changed_is_found_out(tmp_path: Path) -> None:
-    found = check_submission(CONTROLLER, tmp_path)
-    (found.path / "controller.py").write_bytes(b"class Controller: other = 1")
-    with pytest.raises(InputError, match="has been changed"):
-        load_submission(tmp_path, found.digest)
-    for digest in ("../x", "0" * 64):
-        with pytest.raises(InputError, match="no such submission"):
-            load_submission(tmp_path, digest)

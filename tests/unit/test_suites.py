@@ -12,17 +12,16 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 from referencing import Registry, Resource
+from scripts.schemas import ID, shipped
 
 from dubins_traffic.campaign.report.statistics import estimate, share
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
-from dubins_traffic.problem.schema import ID, schema_text, shipped_schema
 from dubins_traffic.suites import gather
 from dubins_traffic.suites.cases import run_cases
 from dubins_traffic.suites.comparing import compare_trials, open_sources
 from dubins_traffic.suites.games import Solver, agrees, check_command, run_games
 from dubins_traffic.suites.run_suite import run_suite
-from dubins_traffic.suites.schema import result_schema, shipped_suite_schemas, suite_schema
 from dubins_traffic.suites.suite import Suite, load_suite, shipped_suites
 from dubins_traffic.suites.writing import TABLE, results, write_results
 from tests.suites import cases, document, games
@@ -42,17 +41,14 @@ def test_shipped_suites_are_frozen() -> None:
 
 
 def test_documents_keep_to_the_schemas(tmp_path: Path) -> None:
-    shipped = shipped_suite_schemas()
-    for own, name in ((suite_schema(), "suite"), (result_schema(), "suite-result")):
-        assert schema_text(own) == schema_text(shipped[name])
     registry: Any = Registry().with_resources(
-        [(ID + "configuration", Resource.from_contents(shipped_schema("configuration")))]
+        [(ID + "configuration", Resource.from_contents(shipped("configuration")))]
     )
-    validator = Draft202012Validator(shipped["suite"], registry=registry)
+    validator = Draft202012Validator(shipped("suite", "suites"), registry=registry)
     for name in shipped_suites():
         validator.validate(load_suite(name).document)
     path = run_games(Suite.from_document(games()), tmp_path, Solver())
-    Draft202012Validator(shipped["suite-result"]).validate(json.loads(path.read_text()))
+    Draft202012Validator(shipped("suite-result", "suites")).validate(json.loads(path.read_text()))
 
 
 def test_the_hash_is_of_what_decides_problems_and_scores() -> None:

@@ -11,6 +11,7 @@ from time import process_time
 
 import numpy as np
 import pytest
+from experiments.play import Environment, play
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.roads.network import RoadNetwork
@@ -21,7 +22,6 @@ from dubins_traffic.synthesis.checker import StrategyError, check
 from dubins_traffic.synthesis.counter import Counterstrategy
 from dubins_traffic.synthesis.export import save_game
 from dubins_traffic.synthesis.game import build, estimate
-from dubins_traffic.synthesis.play import Environment, play
 from dubins_traffic.synthesis.queues import WHO
 from dubins_traffic.synthesis.solver import Solution, solve
 from dubins_traffic.synthesis.story import story_of
@@ -320,7 +320,7 @@ def test_ctrl_c_ends_a_search_soon() -> None:
 PLAIN = """
 import numpy as np
 from tests.games import solved
-from dubins_traffic.synthesis.play import Environment, play
+from experiments.play import Environment, play
 from dubins_traffic.synthesis.strategy import Strategy
 solution = solved(2, 2, 1)
 game = solution.game

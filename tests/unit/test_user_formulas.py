@@ -12,6 +12,7 @@ from typing import Any
 import jsonschema
 import numpy as np
 import pytest
+from scripts.schemas import shipped
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.cli.main import main
@@ -22,7 +23,6 @@ from dubins_traffic.problem.document import instance_from_document, instance_to_
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.problem.schema import shipped_schema
 from dubins_traffic.record.reader import read
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.vocabulary import Proposition, Vocabulary
@@ -90,11 +90,11 @@ def test_instances_carry_formulas() -> None:
     assert instance_from_document(made) == found
     assert "formulas" not in instance_to_document(instance({}))
     assert "formulas" not in instance_to_document(found, version=0)
-    jsonschema.validate(made, shipped_schema("instance"))
-    jsonschema.validate(document(MINE), shipped_schema("configuration"))
+    jsonschema.validate(made, shipped("instance"))
+    jsonschema.validate(document(MINE), shipped("configuration"))
     for wrong in ({"": "[] a"}, {"a": 1}, ["[] a"]):
         with pytest.raises(jsonschema.ValidationError):
-            jsonschema.validate({**made, "formulas": wrong}, shipped_schema("instance"))
+            jsonschema.validate({**made, "formulas": wrong}, shipped("instance"))
 
 
 @pytest.mark.parametrize(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from experiments.free_flow import free_flow
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -22,7 +23,6 @@ from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.reader import read
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.routing.free_flow import free_flow
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach
 from dubins_traffic.runs.single import run_trial

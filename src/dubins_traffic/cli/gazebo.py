@@ -11,7 +11,7 @@ import typer
 from dubins_traffic.cli import faults, options
 
 if TYPE_CHECKING:
-    from dubins_traffic.simulators.gazebo.packages import Progress
+    from dubins_traffic.simulators.gazebo.install import Progress
 
 INSTALL_EXAMPLES = options.examples("gazebo install", "gazebo install --prefix ~/gazebo")
 DOCTOR_EXAMPLES = options.examples("gazebo doctor")

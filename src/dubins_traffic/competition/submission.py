@@ -106,23 +106,6 @@ def check_submission(
     return _submission(digest, path, manifest)
 
 
-def load_submission(store: str | os.PathLike[str], digest: str, bounds: Bounds | None = None) -> Submission:
-    """Return a stored submission; `bounds` are those under which it was checked.
-
-    Raises
-    ------
-    InputError
-        If there is none of this digest, or what is stored has been changed.
-    """
-    path = Path(store) / digest
-    if not re.fullmatch(r"[0-9a-f]{64}", digest) or not path.is_dir():
-        raise InputError("no such submission", file=os.fspath(store), value=digest)
-    files = folder_files(path, bounds or Bounds())
-    if content_digest(files) != digest:
-        raise InputError("what is stored has been changed", file=str(path))
-    return _submission(digest, path, _manifest(files))
-
-
 def content_digest(files: dict[str, bytes]) -> str:
     """Return the digest of what a submission holds."""
     lines = (f"{hashlib.sha256(files[name]).hexdigest()}  {name}\n" for name in sorted(files))

@@ -8,11 +8,6 @@ from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit
 
-TAN_WANDER = 0.07011455787200271
-"""Tangent of 0.07 rad, the bearing tolerance of the 2016 e-agent."""
-TAN_SIMPLE = 0.10033467208545055
-"""Tangent of 0.1 rad, the bearing tolerance of the 2016 ego controller."""
-
 STEEP = 1.0
 """Tangent of the bearing error beyond which a car that drives curves turns in place, if it can."""
 

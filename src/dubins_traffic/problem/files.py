@@ -14,7 +14,6 @@ from typing import Any, cast
 
 from dubins_traffic.errors import InputError, RecordError
 from dubins_traffic.files import decoded, is_stream, packed, read_bytes, require_output, write_text
-from dubins_traffic.roads.formats.registry import is_map
 
 STANDARD_INPUT = "-"
 MCAP_MAGIC = b"\x89MCAP0\r\n"
@@ -188,13 +187,6 @@ def detect(document: Mapping[str, Any], file: str | None = None) -> Kind:
 
 
 _CONFIGURATION_ONLY = frozenset({"number_trials", "duration_bounds", "number_goals_bounds", "network"})
-
-
-def detect_text(text: str, file: str | None = None) -> Kind:
-    """Return the kind of a text: a road network in a map format other than JSON, otherwise as `detect` says."""
-    if is_map(text):
-        return Kind.NETWORK
-    return detect(parse_json(text, file), file)
 
 
 def _object(pairs: Iterable[tuple[str, Any]]) -> dict[str, Any]:

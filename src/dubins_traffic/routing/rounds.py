@@ -28,7 +28,11 @@ def find_all(problems: Iterable[Problem]) -> None:
 
 
 def round_time(problem: Problem) -> float:
-    """Return the seconds of a round through all goals in free flow (`routing.free_flow`); inf if there is none."""
+    """Return the seconds of a round through all goals in free flow: at top speed on empty roads; inf if there is none.
+
+    The round is the shortest closed route through all goals, which turns round at dead ends only; that of a single goal
+    goes to the nearest other intersection and back, since that makes a visit. Turning costs nothing.
+    """
     found = free_round(lane_graph(problem.network), problem.goal_vertices)
     return inf if found is None else found.length / problem.car.bounds.speed
 

@@ -48,6 +48,13 @@ RULES: Final[tuple[str, ...]] = (
 )  # fmt: skip
 """Names of the rules, by number."""
 
+PENDING: Final = (
+    ("2.return", "free_since"),
+    ("E3.enter", "first_since"),
+    ("E4", "exit_counts"),
+)
+"""Rules that a car breaks if nothing changes for long enough, and the field of `JudgedCar` whose run tells so."""
+
 MOST: Final = len(RULES)
 """Most breaches that one car can begin in one frame: one of each rule."""
 

@@ -20,6 +20,7 @@ from dubins_traffic.kernels.arrays import Bits, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Grid, Rows
 from dubins_traffic.rules.breach_log import (
+    PENDING,
     RULE,
     RULES,
     BreachLog,
@@ -39,12 +40,6 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee_kernel import judge_frame, judge_frames
 from dubins_traffic.rules.tables import spread, ticks
 
-_PENDING = (
-    ("2.return", "free_since"),
-    ("E3.enter", "first_since"),
-    ("E4", "exit_counts"),
-)
-"""Rules that a car breaks if nothing changes for long enough, and the field of `JudgedCar` whose run tells so."""
 _ROOMY = 64
 """Frames, each with all breaches that are possible, for which the log has rows when a block is judged."""
 
@@ -303,7 +298,7 @@ def _journey_ticks(problem: JudgedProblem, given: RuleParameters) -> int:
 
 def pending_of(trials: Ints, terms: Rows[RefereeParameters], breach_log: BreachLog) -> list[Pending]:
     """Return the pending obligations of some trials."""
-    runs = np.stack([breach_log.car[clock][trials] >= 0 for _, clock in _PENDING], axis=-1)
+    runs = np.stack([breach_log.car[clock][trials] >= 0 for _, clock in PENDING], axis=-1)
     goal: list[bool] = (breach_log.goal["since"] >= 0).tolist()
     begins, ends = terms["goals_begin"].tolist(), terms["goals_end"].tolist()
     taken = [any(goal[begins[b] : ends[b]]) for b in trials.tolist()]
@@ -317,12 +312,12 @@ def pending_of(trials: Ints, terms: Rows[RefereeParameters], breach_log: BreachL
 
 @cache
 def _pending(ego: tuple[bool, ...], others: tuple[bool, ...], goal_taken: bool) -> Pending:
-    """Return the pending obligations of cars of which these runs of `_PENDING` go on; equal ones are shared."""
+    """Return the pending obligations of cars of which these runs of `PENDING` go on; equal ones are shared."""
     return Pending(_named(ego), _named(others) | {"E6"} if goal_taken else _named(others))
 
 
 def _named(runs: Sequence[bool]) -> frozenset[str]:
-    return frozenset(rule for (rule, _), run in zip(_PENDING, runs, strict=True) if run)
+    return frozenset(rule for (rule, _), run in zip(PENDING, runs, strict=True) if run)
 
 
 def breach_of(found: FoundBreach, x: float, y: float) -> Breach:

@@ -21,7 +21,6 @@ HOUR = 3600.0
 DEADLINES = {"received": HOUR, "checking": HOUR, "queued": 168 * HOUR, "running": 48 * HOUR, "scoring": HOUR}
 """How long a submission may stay in a state, seconds; what stays longer fails by our fault."""
 ACTIVE = tuple(DEADLINES)
-FINAL = ("done", "rejected", "failed", "cancelled")
 OURS, THEIRS = "platform", "submission"
 CHUNK = 10
 """Trials in a unit of work."""

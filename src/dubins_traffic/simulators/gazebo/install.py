@@ -7,15 +7,15 @@ import fcntl
 import os
 import platform
 import shutil
+import signal
 import subprocess
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from pathlib import Path
 from typing import Final
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.simulators.gazebo import build, prefix
 from dubins_traffic.simulators.gazebo.doctor import drive_ahead
-from dubins_traffic.simulators.gazebo.packages import Apt, Progress
 
 ROOM: Final = 1_350_000_000
 """Bytes that an installation needs on disk while it is made."""
@@ -27,7 +27,13 @@ Gazebo 11 goes into {folder}
   about 260 MB to download, 1.1 GB on disk, two minutes; no root needed, nothing outside that folder is touched
   Gazebo is under the Apache License 2.0; the libraries it needs are Debian's packages, each under the licence in the
   copyright file that it carries, below the folder root of the installation"""
+SCRIPT: Final = "gazebo-packages.sh"
+"""What fetches and unpacks Debian's packages: in `scripts` of the sources, in a wheel beside this module."""
 OWN: Final = "This machine's own Gazebo is used: {server}\n  only its plugin is built, in {folder}"
+
+
+Progress = Callable[[str, float], None]
+"""Called with a text on what is being done, and the share of it that is done."""
 
 
 def announcement(folder: Path) -> str:
@@ -84,7 +90,6 @@ def _install(folder: Path, progress: Progress) -> None:
 
 
 def _unpack(folder: Path, root: Path, progress: Progress) -> None:
-    apt = Apt(folder / "apt")
     free = shutil.disk_usage(folder).free
     present = _size(root)
     if free + present < ROOM:
@@ -94,13 +99,35 @@ def _unpack(folder: Path, root: Path, progress: Progress) -> None:
             value=f"{free / 1e9:.2f} GB free",
             expected=f"{(ROOM - present) / 1e9:.2f} GB",
         )
-    apt.prepare(progress)
-    left = apt.left(apt.wanted())
-    if left:
-        apt.fetch(left, progress)
-        apt.unpack(left, root, progress)
-    shutil.rmtree(apt.home)
+    fetch_packages(folder, progress)
+    shutil.rmtree(folder / "apt")
     (folder / UNPACKED).touch()
+
+
+def fetch_packages(folder: Path, progress: Progress) -> None:
+    """Fetch and unpack Debian's packages of Gazebo below `folder`, by a script that goes on where it stopped.
+
+    Raises
+    ------
+    InputError
+        If it could not; says what the script said last.
+    """
+    beside = Path(__file__).with_name(SCRIPT)
+    script = beside if beside.is_file() else Path(__file__).parents[4] / "scripts" / SCRIPT
+    command = ["bash", str(script), str(folder)]
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True, start_new_session=True) as process:
+        try:
+            for line in process.stdout or ():
+                stage, _, share = line.rpartition(" ")
+                progress(stage, int(share) / 100.0)
+            said = (process.stderr.read() if process.stderr is not None else "").strip()
+        except BaseException:
+            os.killpg(process.pid, signal.SIGTERM)
+            raise
+    if process.returncode != 0:
+        why = said.splitlines()[-1] if said else "it said nothing"
+        raise InputError(f"Gazebo's packages can't be had ({why})", file=str(folder))
 
 
 def _size(folder: Path) -> int:
