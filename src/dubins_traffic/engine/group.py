@@ -31,7 +31,7 @@ from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import is_quick
-from dubins_traffic.kernels.records import table
+from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.policies.rules.tables import KIND, scratch
 from dubins_traffic.problem.kinds import KEEP_RULES, NUDGED, REMOTE
 from dubins_traffic.protocols import End, Ending
@@ -43,12 +43,12 @@ from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import distinct_problems
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.referee import Breach, breach_of, pending_of, terms_of
-from dubins_traffic.scoring.margins_kernel import margin_rules
+from dubins_traffic.rules.referee import Breach, accused, breach_of, order, pending_of, terms_of
+from dubins_traffic.scoring.findings import Findings
+from dubins_traffic.scoring.margins import EgoMargins, margin_rules
 from dubins_traffic.scoring.metric import Maker
-from dubins_traffic.scoring.outcome import BatchScores
-from dubins_traffic.scoring.score import Score
-from dubins_traffic.scoring.tally_tables import new_tally
+from dubins_traffic.scoring.score import Score, score_of
+from dubins_traffic.scoring.tally import new_tally, tally_margins
 from dubins_traffic.simulators.embedded import Embedded, contact_of
 from dubins_traffic.trial.endings import agent_fault, collision_detail
 from dubins_traffic.trial.forking import reseeded
@@ -246,21 +246,28 @@ class Group:
             return []
         world, begin, name = self._world, begin or {}, bare_name(controller)
         rows, endings = np.array(trials), [ending for b in trials if (ending := self.endings[b]) is not None]
-        frames = np.array([ending.ticks + 1 for ending in endings])
         find_all([own for b in trials if (own := self.instances[b].problem).rules])
-        scores = BatchScores(rows, frames, world.tally, self._margins, world.roads, world.cars)
+        margins = self.margins(rows)
         found: list[Outcome] = []
         pending = pending_of(rows, world.terms, world.breach_log)
         for b, ending, hanging in zip(trials, endings, pending, strict=True):
-            score = scores.score(
-                self.instances[b], b, self.contacts[b], self.breaches[b], self._seen[b], hanging,
-                world.breach_log.entry[b], ending,
-                self._rules[b], name, begin.get(b),
+            instance, contacts, breaches = self.instances[b], self.contacts[b], self.breaches[b]
+            if instance.problem.rules and (breaches or contacts):
+                breaches = sorted([*breaches, *accused(contacts)], key=order)
+            findings = Findings(
+                instance, self._rules[b], ending, ending.ticks, world.tally, b, contacts, breaches, self._seen[b],
+                hanging, margins[b], world.breach_log.entry[b],
             )  # fmt: skip
+            score = score_of(findings, name, begin.get(b))
             if self._feed is not None:
                 score = replace(score, metrics=self._feed.result(b, ending, self.contacts[b]))
             found.append(Outcome(self.instances[b], ending, score))
         return found
+
+    def margins(self, trials: Ints) -> Rows[EgoMargins]:
+        """Return the margins of rules 1 and 2 up to the present frames of `trials`, (B,); others' are infinite."""
+        own = self._world
+        return tally_margins(trials, self.ticks[trials] + 1, own.tally, self._margins, own.roads, own.cars)
 
     def _progress(self, contacts: int, breaches: int) -> Progress:
         trial = table(TrialProgress, len(self.instances))
@@ -339,12 +346,6 @@ class Group:
         for k, breached in enumerate(world.breach_log.found()):
             place, b = world.progress.place[k], int(breached.trial)
             self.breaches[b].append(breach := breach_of(breached, place.x, place.y))
-            if self._is_seen(b, breach):
+            if place.sensed:
                 self._seen[b].add((breach.car, breach.tick))
         world.work.found[0] = world.breach_log.filled[0] = 0
-
-    def _is_seen(self, b: int, breach: Breach) -> bool:
-        """Tell whether the car of a breach was within the ego's sensing radius in the frame of the breach."""
-        ego = self._world.tally.ego[b, breach.tick]
-        dx, dy = ego.x - breach.x, ego.y - breach.y
-        return bool(dx * dx + dy * dy <= self._world.progress.trial[b].sight2)

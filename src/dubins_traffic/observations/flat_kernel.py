@@ -127,7 +127,7 @@ def _crossing(b: int, n: int, v: int, out: npt.NDArray[np.float32], tables: Outl
     out[place + 4] = 1.0 if tables.labels.at[b, n] == v else 0.0
     goal = 0.0
     for k in range(own.first_goal, own.last_goal):
-        if tables.goal[k].vertex == v and tables.goal[k].done == 0:
+        if tables.goal[k].vertex == v and tables.done[k] == 0:
             goal = 1.0
     out[place + 5] = goal
 
@@ -153,10 +153,8 @@ def _goal(b: int, n: int, own: Outlook, out: npt.NDArray[np.float32], tables: Ou
         _, _, tx, ty, _ = frame(roads, own.net, turn)
         out[place + 5] = within(c * tx + s * ty)
         out[place + 6] = within(c * ty - s * tx)
-    todo = 0
-    for k in range(own.first_goal, own.last_goal):
-        todo += 1 - tables.goal[k].done
-    out[place + 7] = todo / (own.last_goal - own.first_goal)
+    goals = own.last_goal - own.first_goal
+    out[place + 7] = (goals - own.goals) / goals
 
 
 @jit

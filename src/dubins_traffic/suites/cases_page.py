@@ -9,7 +9,7 @@ from dubins_traffic.campaign.report.markup import base_style, document, section,
 from dubins_traffic.campaign.report.statistics import share
 from dubins_traffic.errors import InputError
 from dubins_traffic.record.sink import BY_CONTROLLER, FAULTS
-from dubins_traffic.scoring.clean import told_cut, was_cut
+from dubins_traffic.scoring.verdict import told_cut, was_cut
 from dubins_traffic.suites.comparing import Source, check_suite, named_entries
 from dubins_traffic.suites.markdown import markdown_table
 from dubins_traffic.suites.suite import Suite

@@ -8,9 +8,8 @@ from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.report.comparison import Comparison, Standing
 from dubins_traffic.campaign.report.metrics import WALL_METRICS, shown
 from dubins_traffic.campaign.report.statistics import Estimate, Share
-from dubins_traffic.scoring.clean import told_cut
 from dubins_traffic.scoring.columns import SCORES, SECOND
-from dubins_traffic.scoring.verdict import Ruling
+from dubins_traffic.scoring.verdict import Ruling, told_cut
 from dubins_traffic.suites.suite import Suite
 
 NOTE = "Brackets: 95 % intervals, of means by bootstrap, of shares Wilson's."

@@ -13,10 +13,9 @@ from dubins_traffic.campaign.report.metrics import shown, words
 from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share
 from dubins_traffic.campaign.report.worst import Bad
 from dubins_traffic.rules.clauses import clause
-from dubins_traffic.scoring.clean import told_cut
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.notice import assumption_notice
-from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, told_cut
 
 ENDED = "ended by the controller"
 MINUS = "\N{MINUS SIGN}"
