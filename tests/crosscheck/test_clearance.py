@@ -6,8 +6,7 @@ import numpy as np
 from shapely import LineString, Point, Polygon, affinity, box
 
 from dubins_traffic.cars.body import Disc, DiscObstacle, PolygonObstacle, Rectangle
-from dubins_traffic.kernels.boxes import Box
-from dubins_traffic.scoring.box_gap import box_gap
+from dubins_traffic.kernels.boxes import Box, box_gap
 from dubins_traffic.scoring.judging import Judging
 from tests.recordings import feed, make_instance, random_frames
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import NONE, Labels, State
+from dubins_traffic.cars.state import EGO, NONE, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, Box
@@ -99,6 +99,20 @@ def within_sight(dx: float, dy: float, sight2: float) -> bool:
     `sight2` (m2) is the square of that; negative: everything is seen. Whoever asks what a car senses asks here.
     """
     return sight2 < 0.0 or dx * dx + dy * dy <= sight2
+
+
+@jit
+def mark_sensed(trials: Ints, sight2: Floats, state: State, sensed: Ints) -> None:
+    """Write to `sensed` (K, N) 1 for the ego of each of `trials` (K,), and for the cars within its radius.
+
+    `sight2` (B,) are the squares of the radii of all trials, square metres.
+    """
+    for k in range(trials.shape[0]):
+        b: int = trials[k]
+        for n in range(state.count[b]):
+            dx = state.x[b, n] - state.x[b, EGO]
+            dy = state.y[b, n] - state.y[b, EGO]
+            sensed[k, n] = 1 if within_sight(dx, dy, sight2[b]) else 0
 
 
 @jit

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dubins_traffic.cars.sensing import scan
+from dubins_traffic.cars.sensing import scan, within_sight
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.observations.outlook import Outlook, OutlookTables
@@ -167,7 +167,7 @@ def _nearest(b: int, n: int, shown: int, sight2: float, tables: OutlookTables) -
     for other in range(state.count[b]):
         dx, dy = state.x[b, other] - state.x[b, n], state.y[b, other] - state.y[b, n]
         d2 = dx * dx + dy * dy
-        if other != n and d2 <= sight2 and (count < shown or d2 < apart[count - 1]):
+        if other != n and within_sight(dx, dy, sight2) and (count < shown or d2 < apart[count - 1]):
             place = min(count, shown - 1)
             while place > 0 and apart[place - 1] > d2:
                 near[place] = near[place - 1]

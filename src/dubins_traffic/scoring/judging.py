@@ -13,7 +13,7 @@ from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.problem.rule_preconditions import check_demands
+from dubins_traffic.problem.preconditions import check_demands
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import pack
 from dubins_traffic.rules.breach_log import EntryMargins

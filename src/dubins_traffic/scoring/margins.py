@@ -17,6 +17,7 @@ import numpy as np
 
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
+from dubins_traffic.kernels.boxes import Box
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Grid, Rows, record, table
 from dubins_traffic.kernels.tables import Tables
@@ -24,6 +25,7 @@ from dubins_traffic.logic.temporal import ticks
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction_at, nearest_segment
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.rules.shape import half_extent
 from dubins_traffic.scoring.verdict import EGO_NAME, Verdict
 
 if TYPE_CHECKING:
@@ -200,11 +202,11 @@ def _beyond(b: int, ego: EgoFrame, net: Any, tables: MarginTables) -> Any:
     if lane < 0:
         return -INFINITE
     tx, ty = lane_direction_at(roads, net, lane, ego.x, ego.y)
-    c, s = ego.c, ego.s
-    half = abs(c * ty - s * tx) * cars.half_length[b] + abs(c * tx + s * ty) * cars.half_width[b]
+    body = Box(ego.x, ego.y, ego.c, ego.s, cars.half_length[b], cars.half_width[b], cars.rounding[b])
+    half = half_extent(tx, ty, ego.c, ego.s, body)
     _, lateral = lane_coordinates(roads, net, lane, ego.x, ego.y)
     risen = ego.bits & FLAG.LEFT != 0
-    return lateral + (half + cars.rounding[b]) - (own.left_release if risen else own.left_set)
+    return lateral + half - (own.left_release if risen else own.left_set)
 
 
 @jit

@@ -17,6 +17,7 @@ from dubins_traffic.cars.sensing import within_sight
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.boxes import box_gap
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_look, jit_rare
 from dubins_traffic.kernels.records import Grid, Rows, table
 from dubins_traffic.kernels.tables import Tables
@@ -26,7 +27,6 @@ from dubins_traffic.rules.judged import distinct_problems
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.visits import begins_visit, come_by, do_goal, finish_round
-from dubins_traffic.scoring.box_gap import box_gap
 from dubins_traffic.scoring.counts import GoalCounts, RoundCount, TrialCounts
 from dubins_traffic.scoring.icra2016 import COLLISION_DISTANCE, ROAD_HALF_WIDTH
 from dubins_traffic.scoring.icra2016 import counts as counts_in_2016
