@@ -15,7 +15,7 @@ from typing import Final
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.scoring.goals import Visiting
+from dubins_traffic.scoring.judging import Judging
 from tests.contract_blocking import BLOCKING
 from tests.contract_provoking import PROVOKING
 from tests.contract_stages import Scene
@@ -39,12 +39,6 @@ class Came:
     bound: float
 
 
-class _Times(Visiting):
-    def ticks(self) -> list[int]:
-        """Return the frames of the visits."""
-        return [tick for tick, _ in self._order]
-
-
 def bound_of(problem: Problem, rules: RuleParameters) -> float:
     """Return how long the ego may be kept waiting by cars that break nothing, seconds: see `test_contract`."""
     longest = float(problem.network.lengths.max()) / problem.car.bounds.speed
@@ -57,7 +51,7 @@ def trial(name: str, number: int, seconds: float | None = None) -> Came:
     instance, controller = SCENES[name](number)
     if seconds is not None:
         instance = replace(instance, duration=seconds)
-    times = _Times()
+    times = Judging()
     result = run_trial(instance, controller, sinks=[times], sketch=False)
     verdict = result.score.verdict
     assert verdict is not None
@@ -67,7 +61,7 @@ def trial(name: str, number: int, seconds: float | None = None) -> Came:
         f"{one.rule} {one.time:.2f}" for one in verdict.violations if one.car == "ego" and one.tick < fall
     )
     end = others[0].time if others else result.ending.ticks / instance.problem.rate
-    visits = [tick / instance.problem.rate for tick in times.ticks()]
+    visits = [tick / instance.problem.rate for tick, _ in times.visits]
     marks = [0.0, *(time for time in visits if time < end), end]
     rules = RuleParameters.from_mapping(instance.problem.rules)
     return Came(

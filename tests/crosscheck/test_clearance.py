@@ -7,7 +7,8 @@ import pytest
 from shapely import LineString, Point, Polygon, affinity, box
 
 from dubins_traffic.cars.body import Disc, DiscObstacle, PolygonObstacle, Rectangle
-from dubins_traffic.scoring.clearance import Clearance, box_distance
+from dubins_traffic.kernels.boxes import Box, box_gap
+from dubins_traffic.scoring.judging import Judging
 from tests.recordings import feed, make_instance, random_frames
 
 pytestmark = pytest.mark.path
@@ -30,7 +31,11 @@ def test_distances_of_boxes_are_those_of_shapely() -> None:
     half = draw.uniform(0.05, 0.8, (2, count, 2))
     half[1, ::3, 1] = 0.0
     half[0, ::7] = 0.0
-    found = box_distance(pose[0], half[0], pose[1], half[1])
+    boxes = [
+        [Box(*p, *h, 0.0) for p, h in zip(one, size, strict=True)]
+        for one, size in zip(pose, half, strict=True)
+    ]
+    found = np.array([box_gap(one, other) for one, other in zip(*boxes, strict=True)])
     expected = [
         placed(*pose[0][k], *half[0][k]).distance(placed(*pose[1][k], *half[1][k])) for k in range(count)
     ]
@@ -46,8 +51,8 @@ def test_the_smallest_clearance_is_that_of_shapely() -> None:
         body = Rectangle(0.5, 0.3) if seed % 2 else Disc(0.2)
         instance = make_instance(body=body, obstacles=obstacles, names=["agent0", "agent1"])
         frames = replace(random_frames(instance, seed, 40, spread=10.0), contacts=())
-        metric = Clearance()
-        feed(instance, frames, metric)
+        judging = Judging()
+        feed(instance, frames, judging)
         half, grown = ((0.25, 0.15), 0.0) if seed % 2 else ((0.0, 0.0), 0.2)
         gaps = []
         for f in range(40):
@@ -57,4 +62,4 @@ def test_the_smallest_clearance_is_that_of_shapely() -> None:
             )
             gaps += [ego.distance(other) - 2 * grown for other in others]
             gaps += [ego.distance(Point(-2.0, 1.0)) - grown - 0.3, ego.distance(outline) - grown]
-        assert abs(metric.result() - max(0.0, min(gaps))) < 1e-12
+        assert abs(judging.findings().gap - max(0.0, min(gaps))) < 1e-12

@@ -8,14 +8,16 @@ import pytest
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.scoring.icra2016 import Icra2016
+from dubins_traffic.scoring.judging import Judging
+from dubins_traffic.scoring.score import Scorer
 from tests.recordings import feed, make_frames, make_instance, random_frames
 
 
-def metric(instance: Instance, frames: Frames) -> Icra2016:
-    metric = Icra2016()
-    feed(instance, frames, metric)
-    return metric
+def metric(instance: Instance, frames: Frames) -> tuple[float | None, float]:
+    """Return the score of some frames, and the seconds off the road that it counts."""
+    scorer, judging = Scorer(), Judging()
+    feed(instance, frames, scorer, judging)
+    return scorer.result().icra2016, judging.findings().counts.off_ticks / instance.problem.rate
 
 
 def definition(instance: Instance, frames: Frames) -> float | None:
@@ -74,7 +76,7 @@ def score(
 ) -> float | None:
     instance = make_instance(**settings)
     frames = make_frames(instance, ego, *others)
-    result = metric(instance, frames).result()
+    result, _ = metric(instance, frames)
     expected = definition(instance, frames)
     assert result == (None if expected is None else pytest.approx(expected, rel=1e-12))
     return result
@@ -151,11 +153,11 @@ def test_the_road_has_no_rounded_ends() -> None:
     assert score(still(AT_00, 10) + still(beyond, 60) + still(ON, 1), goals=[(1, 0)]) == 0
     instance = make_instance(goals=[(0, 0)])
     corner = make_frames(instance, still((-0.5, -0.1), 60) + still((0.0, 0.0), 1))
-    assert metric(instance, corner).off_road_s == 2.0, "within 0.6 m of the corner, beside no segment"
+    assert metric(instance, corner)[1] == 2.0, "within 0.6 m of the corner, beside no segment"
     edge = make_frames(
         instance, still((1.5, -0.6), 60) + still((1.5, np.nextafter(-0.6, -1.0)), 60) + still(ON, 1)
     )
-    assert metric(instance, edge).off_road_s == 2.0, "0.6 m is on the road"
+    assert metric(instance, edge)[1] == 2.0, "0.6 m is on the road"
 
 
 @pytest.mark.parametrize("seed", range(30))
@@ -164,4 +166,4 @@ def test_random_walks_score_as_defined(seed: int) -> None:
     instance = make_instance(goals=goals, names=["agent0", "agent1"], rate=[30.0, 7.5, 10.0][seed % 3])
     frames = random_frames(instance, seed, 400)
     frames = make_frames(instance, np.column_stack([frames.x[:, 0], frames.y[:, 0]]) * 0.4)
-    assert metric(instance, frames).result() == pytest.approx(definition(instance, frames), rel=1e-12)
+    assert metric(instance, frames)[0] == pytest.approx(definition(instance, frames), rel=1e-12)

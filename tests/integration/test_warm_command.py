@@ -52,7 +52,7 @@ def test_what_runs_and_batches_need_is_asked_for_once(asked) -> None:
         "policies.lanes.policy.decide",
         "policies.rules.policy.decide",
         "shield.nearest_command.shield",
-        "scoring.margins_kernel.find_margins",
+        "scoring.margins.find_margins",
         "rules.frame.label_frame",
         "rules.referee_kernel.judge_frames",
     } <= set(asked)

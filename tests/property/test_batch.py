@@ -9,10 +9,8 @@ import numpy as np
 import pytest
 
 from dubins_traffic.cars.state import Command, Observation, Pose
-from dubins_traffic.engine.asking import ask
-from dubins_traffic.engine.batch import outcomes, run_batch
-from dubins_traffic.engine.batch_records import failed
-from dubins_traffic.engine.controlled import BatchView
+from dubins_traffic.engine.batch import failed, outcomes, run_batch
+from dubins_traffic.engine.controlled import BatchView, ask
 from dubins_traffic.engine.group import Group
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config

@@ -21,7 +21,8 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.scoring.margins import MARGINS, MEASURED, Margins
+from dubins_traffic.scoring.judging import Judging
+from dubins_traffic.scoring.margins import MARGINS, MEASURED
 from dubins_traffic.scoring.score import score
 from tests.judging import GRID, RHO, ROADS, case, frames_of, lanes_in
 from tests.minute import a_minute
@@ -39,11 +40,13 @@ def margins(instance: Instance, script: Sequence[Frame], size: int = 7) -> dict[
 
 
 def of(instance: Instance, frames: Frames, size: int) -> dict[str, float | None]:
-    sink = Margins()
-    sink.begin(instance)
+    judging = Judging()
+    judging.begin(instance)
     for block in blocks(frames, size):
-        sink.frames(block)
-    return sink.result()
+        judging.frames(block)
+    verdict = judging.result()
+    assert verdict is not None
+    return {rule: verdict.robustness[rule] for rule in ("1.collision", *MEASURED)}
 
 
 @pytest.mark.parametrize("roads", ROADS.values(), ids=ROADS)

@@ -20,13 +20,12 @@ from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.scoring.clean import is_clean, was_cut
 from dubins_traffic.scoring.collisions import Collision
 from dubins_traffic.scoring.duration import ran_whole
 from dubins_traffic.scoring.notice import assumption_notice
 from dubins_traffic.scoring.paper import network_size, paper_score
 from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet
-from dubins_traffic.scoring.verdict import Excuse, Place, Ruling, Verdict, Violation
+from dubins_traffic.scoring.verdict import Excuse, Place, Ruling, Verdict, Violation, is_clean, was_cut
 from tests.recordings import feed, make_frames, make_instance
 from tests.rules_scripts import KITE, STAR
 

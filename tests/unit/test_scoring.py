@@ -8,24 +8,34 @@ import pytest
 
 from dubins_traffic.cars.body import Body, Disc, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.cars.state import Contact, Frames
+from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.wall import measured
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.scoring.clearance import Clearance
-from dubins_traffic.scoring.collisions import Collisions
-from dubins_traffic.scoring.driving import Driven, Driving
-from dubins_traffic.scoring.goals import GoalVisits, Visiting, Visits
+from dubins_traffic.scoring.collisions import collisions_of
+from dubins_traffic.scoring.driving import Driven, driven_of
+from dubins_traffic.scoring.duration import early_rounds
+from dubins_traffic.scoring.findings import Findings
+from dubins_traffic.scoring.goals import GoalVisits, Visits
+from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.score import Scorer, ScoreSheet
 from tests.recordings import blocks, feed, make_frames, make_instance
 
 A, B, C, ROAD = (0.2, 0.1), (6.0, 3.5), (3.0, 0.1), (1.5, 0.0)
 
 
+def counted(instance: Instance, frames: Frames, size: int = 30) -> Findings:
+    """Return what is counted in frames that come in blocks of `size`."""
+    judging = Judging()
+    judging.begin(instance)
+    for block in blocks(frames, size):
+        judging.frames(block)
+    return judging.findings()
+
+
 def visits(path: list[tuple[float, float]], **settings: object) -> Visits:
     instance = make_instance(**settings)
-    metric = Visiting()
-    feed(instance, make_frames(instance, path), metric)
-    return metric.result()
+    return counted(instance, make_frames(instance, path)).visits
 
 
 def test_a_visit_is_an_entry_and_a_start_inside_counts() -> None:
@@ -41,15 +51,12 @@ def test_between_two_visits_of_a_goal_is_another_disc(size: int) -> None:
     """Swinging over the edge of a disc is no visit; one goal counts as another disc for another."""
     instance = make_instance(goals=[(0, 0), (2, 1)], ticks=13)
     path = [A, ROAD, A, ROAD, C, ROAD, ROAD, A, ROAD, A, B, ROAD, B, A]
-    frames = make_frames(instance, path)
-    metric = Visiting()
-    metric.begin(instance)
-    for block in blocks(frames, size):
-        metric.frames(block)
+    found = counted(instance, make_frames(instance, path), size)
     rate = instance.problem.rate
-    assert metric.result().goals[0] == GoalVisits((0, 0), 3, 7 / rate)
-    assert metric.result().goals[1].visits == 1
-    assert (metric.result().rounds, metric.now) == (1, [True, False])
+    assert found.visits.goals[0] == GoalVisits((0, 0), 3, 7 / rate)
+    assert found.visits.goals[1].visits == 1
+    assert found.visits.rounds == 1
+    assert [goal.last_visit == found.last for goal in found.goals] == [True, False]
 
 
 def test_entries_while_inside_at_the_block_border_are_not_counted_again() -> None:
@@ -80,12 +87,12 @@ def test_rounds_by_visits() -> None:
 def test_rounds_before_a_breach_count_the_share_of_the_round_begun(size: int) -> None:
     """The visit at frame 0 does not count: who stands in a goal has none, and the first round needs all goals again."""
     instance = make_instance(goals=[(0, 0), (2, 1)], ticks=6)
-    metric = Visiting()
-    metric.begin(instance)
-    for block in blocks(make_frames(instance, [A, B, A, ROAD, C, B, A]), size):
-        metric.frames(block)
-    assert [metric.rounds_until(last) for last in range(7)] == [0.0, 0.5, 1.0, 1.0, 1.0, 1.5, 2.0]
-    assert metric.rounds_until(None) == 2.0
+    frames = make_frames(instance, [A, B, A, ROAD, C, B, A])
+    wanted = [0.0, 0.5, 1.0, 1.0, 1.0, 1.5, 2.0]
+    for last, rounds in enumerate(wanted):
+        early = counted(instance, replace(frames, contacts=(contact(last, 0, 1),)), size).tally.early[0]
+        assert early_rounds(early, 2, None) == rounds
+    assert early_rounds(counted(instance, frames, size).tally.early[0], 2, None) == wanted[-1]
 
 
 @pytest.mark.parametrize(
@@ -121,10 +128,9 @@ def test_without_goals_there_are_no_rounds_and_nothing_is_missed() -> None:
     assert visits([A] * 5, goals=[]) == Visits((), 1.0, 0, recurrent=True)
 
 
-def drive(frames: Frames, instance=None) -> Driven:
-    metric = Driving()
-    feed(instance or make_instance(), frames, metric)
-    return metric.result()
+def drive(frames: Frames) -> Driven:
+    found = counted(make_instance(), frames)
+    return driven_of(found.counts, frames.rate, found.last)
 
 
 def bits(frames: Frames, ego: list[int]) -> Frames:
@@ -177,10 +183,9 @@ def test_collisions_of_the_ego_and_of_others() -> None:
         contact(40, 1, 0, (True, False)),
         contact(50, 0, -3),
     )
-    metric = Collisions()
-    feed(instance, replace(make_frames(instance, [ROAD] * 61), contacts=contacts), metric)
-    assert metric.among_others == 1
-    assert [found.to_json() for found in metric.result()] == [
+    found, among_others = collisions_of(instance.names, contacts)
+    assert among_others == 1
+    assert [one.to_json() for one in found] == [
         {"time": 0.1, "tick": 3, "car": "ego", "with": "agent1", "at_fault": True, "with_at_fault": False},
         {
             "time": 40 / 30,
@@ -207,9 +212,7 @@ def clearance(
     instance = make_instance(**settings)
     frames = make_frames(instance, ego, *others)
     turned = np.full(frames.x.shape, heading)
-    metric = Clearance()
-    feed(instance, replace(frames, c=np.cos(turned), s=np.sin(turned)), metric)
-    return metric.result()
+    return counted(instance, replace(frames, c=np.cos(turned), s=np.sin(turned))).gap
 
 
 BOX = Rectangle(0.5, 0.3)
@@ -252,11 +255,8 @@ def test_without_anything_else_there_is_no_clearance() -> None:
 def test_a_contact_leaves_no_clearance() -> None:
     instance = make_instance()
     frames = make_frames(instance, [ROAD] * 61)
-    metric = Clearance()
-    feed(instance, replace(frames, contacts=(contact(3, 1, 2),)), metric)
-    assert metric.result() > 100
-    feed(instance, replace(frames, contacts=(contact(3, 1, 2), contact(9, 0, 2))), metric)
-    assert metric.result() == 0.0
+    assert counted(instance, replace(frames, contacts=(contact(3, 1, 2),))).gap > 100
+    assert counted(instance, replace(frames, contacts=(contact(3, 1, 2), contact(9, 0, 2)))).gap == 0.0
 
 
 def test_the_score_as_json() -> None:

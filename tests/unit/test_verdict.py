@@ -28,9 +28,8 @@ from dubins_traffic.rules.referee import Breach
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.sandbox import owner_of
 from dubins_traffic.scoring.judging import Judging
-from dubins_traffic.scoring.nearness import is_near
 from dubins_traffic.scoring.score import score
-from dubins_traffic.scoring.verdict import Verdict
+from dubins_traffic.scoring.verdict import Verdict, is_near
 from dubins_traffic.viewer.marks import breach_marks
 from tests.judging import GRID, ROADS, before, case, frames_of, lanes_in, lanes_out
 from tests.minute import a_minute

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import sqrt
 
 from dubins_traffic.agents.tables import STEP, Agent, Agents, Point, Team, Trail
+from dubins_traffic.cars.sensing import within_sight
 from dubins_traffic.cars.state import Command, Pose
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Rows
@@ -35,7 +36,7 @@ def follow(
     sight = agent.sight
     dx = pose.x - ego.x
     dy = pose.y - ego.y
-    seen = dx * dx + dy * dy <= sight * sight
+    seen = within_sight(dx, dy, sight * sight)
     if seen:
         observe(tick, ego.x, ego.y, STEP * scale, path, f, trail)
     if free and on_path(pose.x, pose.y, JOIN * scale, path, f, trail):

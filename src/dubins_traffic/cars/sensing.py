@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import NONE, Labels, State
+from dubins_traffic.cars.state import EGO, NONE, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, Box
-from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.random import DRAW, bell
 from dubins_traffic.kernels.records import Rows, numbers, record, table
 from dubins_traffic.kernels.tables import Tables
@@ -92,6 +92,29 @@ def rays_at(angles: Iterable[float]) -> Rows[Ray]:
     return rays
 
 
+@jit_inline
+def within_sight(dx: float, dy: float, sight2: float) -> bool:
+    """Tell whether a centre `dx` (m) and `dy` (m) from a car's is within its sensing radius.
+
+    `sight2` (m2) is the square of that; negative: everything is seen. Whoever asks what a car senses asks here.
+    """
+    return sight2 < 0.0 or dx * dx + dy * dy <= sight2
+
+
+@jit
+def mark_sensed(trials: Ints, sight2: Floats, state: State, sensed: Ints) -> None:
+    """Write to `sensed` (K, N) 1 for the ego of each of `trials` (K,), and for the cars within its radius.
+
+    `sight2` (B,) are the squares of the radii of all trials, square metres.
+    """
+    for k in range(trials.shape[0]):
+        b: int = trials[k]
+        for n in range(state.count[b]):
+            dx = state.x[b, n] - state.x[b, EGO]
+            dy = state.y[b, n] - state.y[b, EGO]
+            sensed[k, n] = 1 if within_sight(dx, dy, sight2[b]) else 0
+
+
 @jit
 def neighbours(b: int, viewer: int, radius: float, seen: Seen, state: State, labels: Labels) -> int:
     """Write car `viewer` (index), then the others within `radius` (m) by index, into `seen`; return how many rows.
@@ -107,7 +130,7 @@ def neighbours(b: int, viewer: int, radius: float, seen: Seen, state: State, lab
     for n in range(state.count[b]):
         dx = state.x[b, n] - x
         dy = state.y[b, n] - y
-        if n != viewer and dx * dx + dy * dy <= limit:
+        if n != viewer and within_sight(dx, dy, limit):
             other |= _view(b, n, count, seen, state, labels)
             count += 1
     if count < seen.labels.shape[0]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -213,6 +213,16 @@ class Frames:
 
     def __len__(self) -> int:
         return int(self.x.shape[0])
+
+    @property
+    def states(self) -> tuple[State, Labels]:
+        """The frames as a batch, (F, N), that kernels take."""
+        reals: list[Any] = [getattr(self, name) for name in State.field_names[:6]]
+        labels: list[Any] = [getattr(self, name) for name in Labels.field_names]
+        count: Any = np.full(len(self), self.x.shape[1], dtype=np.int64)
+        return State(*map(np.ascontiguousarray, reals), count=count), Labels(
+            *map(np.ascontiguousarray, labels)
+        )
 
     @property
     def time(self) -> Floats:

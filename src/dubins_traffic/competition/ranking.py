@@ -18,10 +18,9 @@ from dubins_traffic.competition.judging import OWNERS, Judged
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.protocols import End
-from dubins_traffic.scoring.clean import was_cut
 from dubins_traffic.scoring.columns import SCORES, SECOND
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE
-from dubins_traffic.scoring.verdict import Ruling
+from dubins_traffic.scoring.verdict import Ruling, was_cut
 
 Result: TypeAlias = Judged | Mapping[str, Any]
 """What came of a trial, or its row alone."""

@@ -6,6 +6,7 @@ tick is the compiled policy `policies.lanes.policy`.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import hypot, inf
 
 import numpy as np
@@ -72,31 +73,34 @@ class Lanes:
 
     def act(self, observation: Observation) -> Command:
         """Return the command of the compiled policy; find another route if that asks for one."""
-        if self._round is None:
-            return Command(0.0, 0.0)
-        known, tick = self._known, observation.tick
-        if known is None or self._blocked or self._closed:
-            known = self._known = self._prepared(known, tick, observation.pose)
-        others = np.asarray(known.other)  # as a plain array, of which a whole row is assigned at once
-        for car in observation.others:
-            others[car.index - 1] = (*car.pose, *car.twist, tick)
-        self._decide(tick, *observation.pose, known, self._roads)
-        ego = known.follower
-        if ego.blocker != NOBODY:
-            self._detour(tick, observation.pose, ego.blocker)
-        return Command(ego.speed, ego.yaw_rate)
+
+        def decide_now(known: Knowledge) -> None:
+            others = np.asarray(known.other)  # as a plain array, of which a whole row is assigned at once
+            for car in observation.others:
+                others[car.index - 1] = (*car.pose, *car.twist, observation.tick)
+            self._decide(observation.tick, *observation.pose, known, self._roads)
+
+        return self._drive(observation.tick, lambda: observation.pose, decide_now)
 
     def act_in(self, b: int, tick: int, radius: float, state: State) -> Command:
         """Drive on as the ego of trial b of a batch, which sees the cars within `radius` (m): what `act` does."""
+        return self._drive(
+            tick,
+            lambda: Pose(*(float(array[b, EGO]) for array in (state.x, state.y, state.c, state.s))),
+            lambda known: self._decide_in(b, tick, radius, state, known, self._roads),
+        )
+
+    def _drive(self, tick: int, pose: Callable[[], Pose], decide_now: Callable[[Knowledge], None]) -> Command:
+        """Let `decide_now` choose the command; `pose` tells where the car is, if it has to find a route."""
         if self._round is None:
             return Command(0.0, 0.0)
         known = self._known
         if known is None or self._blocked or self._closed:
-            known = self._known = self._prepared(known, tick, _pose_in(b, state))
-        self._decide_in(b, tick, radius, state, known, self._roads)
+            known = self._known = self._prepared(known, tick, pose())
+        decide_now(known)
         ego = known.follower
         if ego.blocker != NOBODY:
-            self._detour(tick, _pose_in(b, state), ego.blocker)
+            self._detour(tick, pose(), ego.blocker)
         return Command(ego.speed, ego.yaw_rate)
 
     def _find_round(self) -> Round | None:
@@ -237,8 +241,3 @@ class Lanes:
             if hypot(point[0] - pose.x, point[1] - pose.y) < 3.0:
                 self._blocked[2 * segment + (0 if ahead > 0.0 else 1)] = until
         self._known = self._reroute(known, pose)
-
-
-def _pose_in(b: int, state: State) -> Pose:
-    """Return the pose of the ego of trial b of a batch."""
-    return Pose(*(float(array[b, EGO]) for array in (state.x, state.y, state.c, state.s)))

@@ -15,9 +15,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.controllers.registry import COMPILED
-from dubins_traffic.engine.asking import ask
-from dubins_traffic.engine.batch_records import chosen, folder_of
-from dubins_traffic.engine.controlled import Maker, grouped
+from dubins_traffic.engine.controlled import Maker, ask, grouped
 from dubins_traffic.engine.group import Group, Outcome
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
 from dubins_traffic.errors import InputError
@@ -25,14 +23,15 @@ from dubins_traffic.files import locked
 from dubins_traffic.outside import put_back
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw, draw_many
-from dubins_traffic.protocols import Controller
-from dubins_traffic.runs.record_folder import claim
+from dubins_traffic.protocols import Controller, End
+from dubins_traffic.runs.record_folder import check_folder, claim
 from dubins_traffic.runs.record_folder import name as record_name
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import Maker as MetricMaker
 from dubins_traffic.scoring.metric import MetricSpec
 from dubins_traffic.scoring.score import ScoreSheet
+from dubins_traffic.scoring.verdict import Ruling
 from dubins_traffic.viewer.notebook import Sheeted
 
 if TYPE_CHECKING:
@@ -44,6 +43,8 @@ UNDER_WAY = 3
 """Groups that are submitted per thread: while the oldest is waited for, the others go on."""
 LEAST = 4
 """Least size of the last groups: smaller ones would take longer to set up than to run."""
+KEEP = "none, all, failures or sample:K"
+"""What `keep` may be."""
 Progress = Callable[[int], object]
 
 
@@ -325,3 +326,42 @@ def _recorded(
                     name=called(controller), metrics=metrics,
                 )  # fmt: skip
                 yield replace(outcome, ending=result.ending, score=replace(result.score, record=told))
+
+
+def chosen(keep: str, count: int) -> Callable[[int, Outcome], bool]:
+    """Return a function that tells, from a trial's place among `count` and its outcome, whether its record is kept."""
+    kind, colon, number = keep.partition(":")
+    if kind == "sample" and colon and number.isdigit() and int(number) > 0:
+        wanted = min(int(number), count)
+        sample = {k * count // wanted for k in range(wanted)}
+        return lambda place, _outcome: place in sample
+    if keep not in ("none", "all", "failures"):
+        raise InputError("unknown choice of trials to record", file="--keep", value=keep, expected=KEEP)
+    if keep == "failures":
+        return lambda _place, outcome: failed(outcome)
+    return lambda _place, _outcome: keep == "all"
+
+
+def failed(outcome: Outcome) -> bool:
+    """Tell whether a trial has failed: a rule broken and not excused, a fault, or, if it is not judged, a collision."""
+    if outcome.ending.end not in (End.DURATION, End.COLLISION):
+        return True
+    verdict = outcome.score.verdict
+    return bool(outcome.score.collisions) if verdict is None else verdict.verdict is Ruling.VIOLATED
+
+
+def folder_of(keep: str, records: str | os.PathLike[str] | None) -> Path | None:
+    """Return the folder for records, made if missing, or None if none are kept.
+
+    InputError if `keep` asks for records without a folder, a folder is given without `keep`, or it can't be made.
+    """
+    if keep == "none" or records is None:
+        if (keep == "none") != (records is None):
+            raise InputError(
+                "records are kept in a folder",
+                file="--keep, --records",
+                value=(keep, records),
+                expected="both, or neither",
+            )
+        return None
+    return check_folder(records)

@@ -15,6 +15,7 @@ from dubins_traffic.agents.nudge import nudge_trial
 from dubins_traffic.agents.tables import Scene
 from dubins_traffic.cars.motion import OUTCOME, Motion, step_trial
 from dubins_traffic.cars.near import refresh_spacing, spacing_loss
+from dubins_traffic.cars.sensing import within_sight
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare, jit_wide
@@ -28,8 +29,7 @@ from dubins_traffic.rules.frame import label_trial
 from dubins_traffic.rules.obstacles import ObstacleLanes
 from dubins_traffic.rules.referee_kernel import judge_trial
 from dubins_traffic.rules.tables import LabelTables, Memory, TrialRules
-from dubins_traffic.scoring.tally import count_frame
-from dubins_traffic.scoring.tally_tables import Counted
+from dubins_traffic.scoring.tally import Counted, count_frame
 
 
 class _Status(NamedTuple):
@@ -98,11 +98,13 @@ class ContactNote:
 
 @record
 class BreachPlace:
-    """Centre of the car of a breach in its frame, metres."""
+    """Where the car of a breach was in its frame."""
 
     x: float
     y: float
-    """Metres."""
+    """Its centre, metres."""
+    sensed: int
+    """1 if it was within the ego's sensing radius."""
 
 
 class Progress(Tables):
@@ -251,7 +253,7 @@ def _is_sensed(b: int, n: int, world: World) -> int:
     """Return 1 if car n is within the ego's sensing radius, else 0."""
     dx = world.state.x[b, n] - world.state.x[b, EGO]
     dy = world.state.y[b, n] - world.state.y[b, EGO]
-    return 1 if dx * dx + dy * dy <= world.tally.trial[b].sight2 else 0
+    return 1 if within_sight(dx, dy, world.tally.trial[b].sight2) else 0
 
 
 @jit_inline
@@ -265,7 +267,8 @@ def _observe(b: int, tick: int, world: World) -> None:
     judge_trial(b, tick, world.judging)
     for k in range(first, breach_log.filled[0]):
         n = breach_log.row[k].car
-        world.progress.place[k].x = world.state.x[b, n]
-        world.progress.place[k].y = world.state.y[b, n]
+        place = world.progress.place[k]
+        place.x, place.y = world.state.x[b, n], world.state.y[b, n]
+        place.sensed = _is_sensed(b, n, world)
         if n == EGO:
             tally.trial[b].sealed = 1

@@ -1,22 +1,25 @@
-"""Batched trials whose egos are driven by controllers in Python: one for each trial, or one for all at once."""
+"""Batched trials whose egos are driven by controllers in Python, asked in every tick: one a trial, or one for all."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import replace
 from functools import partial
+from itertools import islice
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
 
+from dubins_traffic.cars.sensing import mark_sensed
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.controllers import blame
 from dubins_traffic.controllers.registry import made
 from dubins_traffic.engine.group import Group, Outcome
-from dubins_traffic.errors import ControllerError, DubinsTrafficError
+from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.protocols import Controller, End
 from dubins_traffic.record.sink import SHIELD
@@ -130,7 +133,7 @@ class Controlled:
     def _look(self) -> None:
         """Set up what each ego observes, and where the reports of its controller go."""
         trials = range(len(self.group.instances))
-        self._views = [self._of_trial(b) for b in trials]
+        self._views = [self.group.of_trial(b) for b in trials]
         self._notes = [partial(self._hear, b) for b in trials]
 
     def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Controlled:
@@ -203,12 +206,10 @@ class Controlled:
         arrays: list[Any] = [array[b] for array in (*group.state[:6], *group.labels)]
         if missing:
             arrays = [np.pad(array, ((0, 0), (0, missing))) for array in arrays]
-        x, y = arrays[0], arrays[1]
-        radii = np.array([instance.problem.sensing_radius for instance in group.instances])
-        radius = radii[b][:, None]
         count = group.state.count[b]
-        dx, dy = x - x[:, :1], y - y[:, :1]
-        seen = (dx * dx + dy * dy <= radius * radius) & (np.arange(places) < count[:, None])
+        sensed = np.zeros((len(b), places), dtype=np.int64)
+        mark_sensed(b, np.ascontiguousarray(group.world.progress.trial["sight2"]), group.state, sensed)
+        seen = sensed != 0
         hidden = ~seen
         for array, nothing in zip(arrays, (*[np.nan] * 6, 0, -1, -1, -1, 0), strict=True):
             array[hidden] = nothing
@@ -238,13 +239,6 @@ class Controlled:
                 outcome, score=score, act_s=summary(self._seats[b].latencies if self._seats else ())
             )
 
-    def _of_trial(self, b: int) -> tuple[State, Labels]:
-        """Return views of the state and labels of trial b, (1, N)."""
-        group, cars = self.group, len(self.group.instances[b].starts)
-        reals: list[Any] = [array[b : b + 1, :cars] for array in group.state[:6]]
-        whole: list[Any] = [array[b : b + 1, :cars] for array in group.labels]
-        return State(*reals, count=group.state.count[b : b + 1]), Labels(*whole)
-
 
 def grouped(instances: Sequence[Instance]) -> list[list[Instance]]:
     """Return instances in groups that can be stepped together: of one control rate, width and length of trails."""
@@ -253,3 +247,102 @@ def grouped(instances: Sequence[Instance]) -> list[list[Instance]]:
         gap = max((agent.driver.parameters.get("gap") or 0.0 for agent in instance.e_agents), default=0.0)
         groups.setdefault((instance.problem.rate, instance.problem.car.w, gap), []).append(instance)
     return list(groups.values())
+
+
+def ask(
+    instances: Iterable[Instance],
+    make: Maker,
+    controller: str,
+    batch: int,
+    cancelled: Callable[[], bool] = lambda: False,
+    metrics: Sequence[MetricMaker] = (),
+) -> Iterator[Outcome]:
+    """Run trials, `batch` at a time, and yield the outcome of each when it ends; another trial then takes its place.
+
+    It calls `cancelled` in every tick and raises KeyboardInterrupt if that returns true.
+
+    Parameters
+    ----------
+    instances
+        One for each trial.
+    make
+        Makes the controller: one for each trial, or one for all if it is a `BatchController`.
+    controller
+        Name of the controller, for the outcomes.
+    batch
+        Most trials that run at a time.
+    metrics
+        Each makes a further metric for a trial.
+    """
+    made = make()
+    shared = made if isinstance(made, BatchController) else None
+    waiting = iter(instances)
+    seats: list[Controlled] = []
+    while True:
+        if cancelled():
+            raise KeyboardInterrupt
+        free = batch - sum(len(own.group.active) for own in seats)
+        taken = list(islice(waiting, free)) if 8 * free >= batch else []
+        for own in grouped(taken):
+            if shared is not None:
+                check_clear(own)
+            seats.append(Controlled(own, make, shared, metrics))
+        if not seats:
+            return
+        if shared is None:
+            for own in seats:
+                own.ask_each()
+        else:
+            ask_all(seats, shared)
+        for own in seats:
+            yield from own.step(controller)
+        seats = [own for own in seats if len(own.group.active)]
+
+
+def ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
+    """Ask one controller for the commands of all egos."""
+    seats = [own for own in seats if len(own.group.active)]
+    if not seats:
+        return
+    places = max(own.group.state.x.shape[1] for own in seats)
+    views = [own.view(places) for own in seats]
+    whole = BatchView(
+        np.concatenate([view.trial for view in views]),
+        np.concatenate([view.tick for view in views]),
+        State(*_joined([view.state for view in views])),
+        Labels(*_joined([view.labels for view in views])),
+        np.concatenate([view.seen for view in views]),
+    )
+    try:
+        answer = np.array(controller.act_batch(whole), dtype=np.float64)  # a copy: it may keep its own
+        if answer.shape != (len(whole.trial), 2):
+            raise TypeError(f"act_batch returned {answer.shape}, not {(len(whole.trial), 2)}")
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        blame.show(error)
+        for own in seats:
+            own.fail(error)
+        return
+    row = 0
+    for own, view in zip(seats, views, strict=True):
+        own.take_all(view.tick, answer[row : row + len(view.tick)])
+        row += len(view.tick)
+
+
+def _joined(tables: Sequence[Tables]) -> list[Any]:
+    """Return, for each column, the arrays of several tables concatenated."""
+    return [np.concatenate(arrays) for arrays in zip(*tables, strict=True)]
+
+
+def check_clear(instances: Sequence[Instance]) -> None:
+    """Refuse instances with noise in observations: a BatchController is shown the true poses."""
+    for instance in instances:
+        noise = instance.disturbances
+        if noise.position_noise > 0.0 or noise.heading_noise > 0.0:
+            raise InputError(
+                "a controller with start_batch and act_batch is shown poses without noise",
+                field="disturbances",
+                value=noise,
+                expected="no noise, or a controller with start and act",
+            )

@@ -21,7 +21,7 @@ from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.rules.breach_log import BreachLog, FoundBreach, RefereeParameters, RefereeTables
 from dubins_traffic.rules.tables import LabelTables, spread
-from dubins_traffic.scoring.tally_tables import Tally
+from dubins_traffic.scoring.tally import Tally
 
 Table = TypeVar("Table", bound=Tables)
 
@@ -148,7 +148,8 @@ def _tally(tally: Tally, trials: Ints) -> Tally:
     goals = ragged(np.append(tally.trial["first_goal"], len(tally.goal)), trials)
     own = tally.trial[trials]
     own["first_goal"], own["last_goal"] = goals.off[:-1], goals.off[1:]
-    return rows_of(tally, trials, trial=own, goal=tally.goal[goals.row])
+    names = "goal", "sample_done", "round_done", "early_done"
+    return rows_of(tally, trials, trial=own, **{name: getattr(tally, name)[goals.row] for name in names})
 
 
 def _agents(agents: Agents, trials: Ints, seeds: npt.NDArray[np.uint64] | None) -> Agents:

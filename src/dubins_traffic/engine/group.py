@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,13 +25,12 @@ from dubins_traffic.engine.batch_kernel import (
     World,
     run_trials,
 )
-from dubins_traffic.engine.feed import Feed
 from dubins_traffic.engine.fork import world_of
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import is_quick
-from dubins_traffic.kernels.records import table
+from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.policies.rules.tables import KIND, scratch
 from dubins_traffic.problem.kinds import KEEP_RULES, NUDGED, REMOTE
 from dubins_traffic.protocols import End, Ending
@@ -43,13 +42,15 @@ from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import distinct_problems
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.referee import Breach, breach_of, pending_of, terms_of
-from dubins_traffic.scoring.margins_kernel import margin_rules
+from dubins_traffic.rules.referee import Breach, accused, breach_of, order, pending_of, terms_of
+from dubins_traffic.scoring.findings import Findings
+from dubins_traffic.scoring.margins import EgoMargins, margin_rules
 from dubins_traffic.scoring.metric import Maker
-from dubins_traffic.scoring.outcome import BatchScores
-from dubins_traffic.scoring.score import Score
-from dubins_traffic.scoring.tally_tables import new_tally
+from dubins_traffic.scoring.own_metrics import OwnMetrics
+from dubins_traffic.scoring.score import Score, score_of
+from dubins_traffic.scoring.tally import new_tally, tally_margins
 from dubins_traffic.simulators.embedded import Embedded, contact_of
+from dubins_traffic.trial.buffer import FrameBuffer
 from dubins_traffic.trial.endings import agent_fault, collision_detail
 from dubins_traffic.trial.forking import reseeded
 
@@ -141,7 +142,8 @@ class Group:
         self.contacts: list[list[Contact]] = [[] for _ in instances]
         self.breaches: list[list[Breach]] = [[] for _ in instances]
         self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
-        self._feed = Feed(instances, places, metrics) if metrics else None
+        own = [[OwnMetrics(metrics)] for _ in instances]
+        self._buffer = FrameBuffer(instances, own) if metrics else None
         self._take = bound(run_trials)
         self._run(self.active, 1)
         self._aim()
@@ -189,12 +191,12 @@ class Group:
         twin.breaches = [list(self.breaches[b]) for b in trials]
         twin._seen = [set(self._seen[b]) for b in trials]
         twin._take = bound(run_trials)
-        twin._feed = None if self._feed is None else self._feed.fork(trials, twin.instances)
+        twin._buffer = None if self._buffer is None else self._buffer.fork(trials, twin.instances)
         twin._note_rules()
-        if twin._feed is not None and seeds is not None:
+        if twin._buffer is not None and seeds is not None:
             for k, seed in enumerate(seeds):
                 if seed != self.instances[trials[k]].seed:
-                    twin._feed.note(k, reseeded(int(twin.ticks[k]), seed))
+                    twin._buffer.note(reseeded(int(twin.ticks[k]), seed), k)
         return twin
 
     @property
@@ -206,6 +208,13 @@ class Group:
     def world(self) -> World:
         """All tables of the group."""
         return self._world
+
+    def of_trial(self, b: int) -> tuple[State, Labels]:
+        """Return views of the state and labels of trial b, (1, N), as of a batch of one."""
+        cars = len(self.instances[b].starts)
+        reals: list[Any] = [array[b : b + 1, :cars] for array in self.state[:6]]
+        whole: list[Any] = [array[b : b + 1, :cars] for array in self.labels]
+        return State(*reals, count=self.state.count[b : b + 1]), Labels(*whole)
 
     @property
     def active(self) -> Ints:
@@ -235,8 +244,8 @@ class Group:
 
     def note(self, b: int, kind: str, detail: str) -> None:
         """Hand an event of the ego, at the present tick of trial b, to its metrics."""
-        if self._feed is not None:
-            self._feed.note(b, Event(int(self.ticks[b]), kind, EGO, detail))
+        if self._buffer is not None:
+            self._buffer.note(Event(int(self.ticks[b]), kind, EGO, detail), b)
 
     def outcomes(
         self, trials: Sequence[int], controller: str, begin: Mapping[int, float | None] | None = None
@@ -246,21 +255,30 @@ class Group:
             return []
         world, begin, name = self._world, begin or {}, bare_name(controller)
         rows, endings = np.array(trials), [ending for b in trials if (ending := self.endings[b]) is not None]
-        frames = np.array([ending.ticks + 1 for ending in endings])
         find_all([own for b in trials if (own := self.instances[b].problem).rules])
-        scores = BatchScores(rows, frames, world.tally, self._margins, world.roads, world.cars)
+        margins = self.margins(rows)
         found: list[Outcome] = []
         pending = pending_of(rows, world.terms, world.breach_log)
         for b, ending, hanging in zip(trials, endings, pending, strict=True):
-            score = scores.score(
-                self.instances[b], b, self.contacts[b], self.breaches[b], self._seen[b], hanging,
-                world.breach_log.entry[b], ending,
-                self._rules[b], name, begin.get(b),
+            instance, contacts, breaches = self.instances[b], self.contacts[b], self.breaches[b]
+            if instance.problem.rules and (breaches or contacts):
+                breaches = sorted([*breaches, *accused(contacts)], key=order)
+            findings = Findings(
+                instance, self._rules[b], ending, ending.ticks, world.tally, b, contacts, breaches, self._seen[b],
+                hanging, margins[b], world.breach_log.entry[b],
             )  # fmt: skip
-            if self._feed is not None:
-                score = replace(score, metrics=self._feed.result(b, ending, self.contacts[b]))
+            score = score_of(findings, name, begin.get(b))
+            if self._buffer is not None:
+                self._buffer.end(ending, b)
+                own = [sink for sink in self._buffer.sinks(b) if isinstance(sink, OwnMetrics)]
+                score = replace(score, metrics=own[0].result())
             found.append(Outcome(self.instances[b], ending, score))
         return found
+
+    def margins(self, trials: Ints) -> Rows[EgoMargins]:
+        """Return the margins of rules 1 and 2 up to the present frames of `trials`, (B,); others' are infinite."""
+        own = self._world
+        return tally_margins(trials, self.ticks[trials] + 1, own.tally, self._margins, own.roads, own.cars)
 
     def _progress(self, contacts: int, breaches: int) -> Progress:
         trial = table(TrialProgress, len(self.instances))
@@ -286,7 +304,7 @@ class Group:
 
     def _run(self, active: Ints, most: int) -> None:
         """Step trials by up to `most` ticks; tick by tick if there are metrics that see every frame."""
-        if self._feed is None:
+        if self._buffer is None:
             self._carry(active, most)
             return
         for _ in range(most):
@@ -294,7 +312,7 @@ class Group:
             before = self.ticks[active].copy()
             self._carry(active, 1)
             moved = active[self.ticks[active] > before]
-            self._feed.push(moved, self.state, self.labels, self.commands, self.contacts)
+            self._buffer.push(self.state, self.labels, self.commands, moved)
 
     def _carry(self, active: Ints, most: int) -> None:
         goal = self.ticks[active] + most
@@ -333,18 +351,15 @@ class Group:
         for k, row in enumerate(world.work.meetings()):
             note = world.progress.contact[k]
             b, contact = row.b, contact_of(row, note.tick, self._rate)
-            self.contacts[b].append(with_fault_by(contact, note.bits, note.other_bits))
+            contact = with_fault_by(contact, note.bits, note.other_bits)
+            self.contacts[b].append(contact)
+            if self._buffer is not None:
+                self._buffer.touch([contact], b)
             pair = ((contact.car, note.sensed), (contact.other, note.other_sensed))
             self._seen[b].update((car, note.tick) for car, is_seen in pair if is_seen)
         for k, breached in enumerate(world.breach_log.found()):
             place, b = world.progress.place[k], int(breached.trial)
             self.breaches[b].append(breach := breach_of(breached, place.x, place.y))
-            if self._is_seen(b, breach):
+            if place.sensed:
                 self._seen[b].add((breach.car, breach.tick))
         world.work.found[0] = world.breach_log.filled[0] = 0
-
-    def _is_seen(self, b: int, breach: Breach) -> bool:
-        """Tell whether the car of a breach was within the ego's sensing radius in the frame of the breach."""
-        ego = self._world.tally.ego[b, breach.tick]
-        dx, dy = ego.x - breach.x, ego.y - breach.y
-        return bool(dx * dx + dy * dy <= self._world.progress.trial[b].sight2)

@@ -6,9 +6,9 @@ parts: so an episode stays the trial that it cites.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from dubins_traffic.cars.state import Labels, Observation, State
+from dubins_traffic.cars.state import Observation
 from dubins_traffic.observations.flat import FlatObserver
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.shield.filter import ShieldFilter
@@ -53,10 +53,7 @@ class Between:
     def __init__(self, group: Group, row: int, shown: int, shield: Overtakes | None) -> None:
         self._group, self._row = group, row
         instance = group.instances[row]
-        cars, one = len(instance.starts), slice(row, row + 1)
-        reals: list[Any] = [array[one, :cars] for array in group.state[:6]]
-        whole: list[Any] = [array[one, :cars] for array in group.labels]
-        self._state, self._labels = State(*reals, count=group.state.count[one]), Labels(*whole)
+        self._state, self._labels = group.of_trial(row)
         self._senses, self._line = Senses(instance), CommandLine(instance)
         noise = instance.disturbances
         is_noisy = noise.position_noise > 0.0 or noise.heading_noise > 0.0

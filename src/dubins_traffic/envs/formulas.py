@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.formulas import check_formulas
@@ -49,11 +49,10 @@ class FormulaWatch:
         if tick == self._tick:
             return
         cars, contacts = len(instance.starts), group.contacts[b]
-        reals: list[Any] = [array[b : b + 1, :cars] for array in group.state[:6]]
+        state, labels = group.of_trial(b)
         asked = [group.commands[b : b + 1, :cars, k] for k in (0, 1)]
-        whole: list[Any] = [array[b : b + 1, :cars] for array in group.labels]
         new = tuple(contacts[self._contacts :])
-        self._verdicts.frames(Frames(tick, instance.problem.rate, *reals, *asked, *whole, contacts=new))
+        self._verdicts.frames(Frames(tick, instance.problem.rate, *state[:6], *asked, *labels, contacts=new))
         self._tick, self._contacts = tick, len(contacts)
         self.states = {one.name: one.verdict for one in self._verdicts.result()}
 

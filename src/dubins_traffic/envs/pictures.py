@@ -106,8 +106,8 @@ class Renderer:
 def _visited(outlook: OutlookTables, row: int) -> list[int]:
     """Return the intersections of the goals that the ego of a trial, by its row, has visited in this round."""
     own = outlook.trial[row]
-    goals = [outlook.goal[k] for k in range(own.first_goal, own.last_goal)]
-    return [goal.vertex for goal in goals if goal.done]
+    rows = range(own.first_goal, own.last_goal)
+    return [outlook.goal[k].vertex for k in rows if outlook.done[k]]
 
 
 def _marks(group: Group, b: int) -> Floats:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, Observation, State
+from dubins_traffic.cars.state import Observation
 from dubins_traffic.envs import info
 from dubins_traffic.envs.fleet import Fleet
 from dubins_traffic.envs.pictures import MODES, SIDE, Renderer
@@ -174,10 +174,5 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
     def _sensed(self, senses: Senses) -> Observation:
         """Return what a controller would be told, with the scan that the laser has made in between."""
         bank, row = self.fleet.seat(0)
-        group, one = bank.group, slice(row, row + 1)
-        cars = len(group.instances[row].starts)
-        reals: list[Any] = [array[one, :cars] for array in group.state[:6]]
-        whole: list[Any] = [array[one, :cars] for array in group.labels]
-        state = State(*reals, count=group.state.count[one])
-        found = senses.observe(self.fleet.tick(0), state, Labels(*whole))
+        found = senses.observe(self.fleet.tick(0), *bank.group.of_trial(row))
         return found if found.scan is None else found._replace(scan=bank.outlook.ranges[row].copy())

@@ -15,10 +15,6 @@ from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
 from dubins_traffic.errors import ControllerError, InputError
 from dubins_traffic.falsification.splitting import Begin
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.records import table
-from dubins_traffic.rules.judged import distinct_problems
-from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.scoring.margins_kernel import EgoMargins, MarginTables, find_margins, margin_rules
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -55,17 +51,7 @@ class Watched:
         if self.rule in ENTRIES:
             entries: Any = world.breach_log.entry[ENTRIES[self.rule]]
             return entries * (1.0 if self.rule == "3.clear" else self.group.instances[0].problem.period)
-        problems = [instance.problem for instance in self.group.instances]
-        kinds, index = distinct_problems(problems)
-        rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
-        found = table(EgoMargins, len(problems))
-        tables = MarginTables(
-            margin_rules(rules, [kind.period for kind in kinds], index),
-            world.roads, world.cars, np.zeros(world.tally.ego.shape[1]),
-        )  # fmt: skip
-        nets = np.ascontiguousarray(world.tally.trial["net"])
-        find_margins(np.arange(len(problems)), self.group.ticks + 1, world.tally.ego, nets, tables, found)
-        margins: Any = found[COLUMNS[self.rule]]
+        margins: Any = self.group.margins(np.arange(len(self.group.instances)))[COLUMNS[self.rule]]
         return margins.copy()
 
     def levels(self) -> Floats:

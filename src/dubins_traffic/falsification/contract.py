@@ -12,9 +12,8 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.kinds import KEEP_RULES
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.scoring.gap_limit import rounds_limit
 from dubins_traffic.scoring.margins import SURE
-from dubins_traffic.scoring.verdict import EGO_NAME, Place, Violation
+from dubins_traffic.scoring.verdict import EGO_NAME, Place, Violation, rounds_limit
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

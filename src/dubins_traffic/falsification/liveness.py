@@ -6,20 +6,20 @@ Of what ``satisfied`` allows that is the part that does not depend on the durati
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import TYPE_CHECKING, Final
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.contract import CONTRACT, limit_of
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import replay
-from dubins_traffic.scoring.goals import Visiting
+from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.margins import LIVENESS, SURE
 from dubins_traffic.scoring.verdict import EGO_RULES
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dubins_traffic.kernels.arrays import Ints
     from dubins_traffic.problem.instance import Instance, Problem
     from dubins_traffic.protocols import Ending
     from dubins_traffic.record.reader import Record
@@ -51,9 +51,23 @@ def spare(problem: Problem, verdict: Verdict, ending: Ending | None) -> float | 
 
 def first_overdue(record: Record, limit: float) -> Overdue | None:
     """Return the first goal of a trial that was not visited for more than `limit` seconds, None if there is none."""
-    visits = _Visits(limit, record.frames.rate)
-    replay(record, [visits])
-    return visits.found()
+    judging = Judging()
+    replay(record, [judging])
+    rate, final = record.frames.rate, len(record.frames) - 1
+    allowed = int(limit * rate)
+    while (allowed + 1) / rate <= limit:
+        allowed += 1
+    over: list[tuple[int, int, int]] = []
+    goals = tuple(dict.fromkeys(record.instance.problem.goals))
+    for goal in range(len(goals)):
+        ticks = [0, *(tick for tick, which in judging.visits if which == goal), final]
+        over += [
+            (since + allowed + 1, goal, since) for since, tick in pairwise(ticks) if tick - since > allowed
+        ]
+    if not over:
+        return None
+    tick, goal, since = min(over)
+    return Overdue(goals[goal], since, tick)
 
 
 def check_long_enough(instances: Sequence[Instance], target: str) -> None:
@@ -74,33 +88,3 @@ def check_long_enough(instances: Sequence[Instance], target: str) -> None:
             "no gap between visits can be over its limit in trials so short", file="--duration", value=longest,
             expected=f"more than {least:.1f} s, or a smaller gap_rounds among the rules",
         )  # fmt: skip
-
-
-class _Visits(Visiting):
-    """Visits, with the first gap that is longer than `limit` seconds at `rate` Hz."""
-
-    def __init__(self, limit: float, rate: float) -> None:
-        self._allowed = int(limit * rate)
-        while (self._allowed + 1) / rate <= limit:
-            self._allowed += 1
-        self._over: list[tuple[int, int, int]] = []
-
-    def _visit(self, goal: int, tick: int, elsewhere: Ints) -> bool:
-        before = int(self._last[goal])
-        counts = super()._visit(goal, tick, elsewhere)
-        if counts:
-            self._note(goal, before, tick)
-        return counts
-
-    def _note(self, goal: int, since: int, tick: int) -> None:
-        if tick - since > self._allowed:
-            self._over.append((since + self._allowed + 1, goal, since))
-
-    def found(self) -> Overdue | None:
-        """Return the first goal that was overdue."""
-        for goal, since in enumerate(self._last.tolist()):
-            self._note(goal, since, self._last_frame)
-        if not self._over:
-            return None
-        tick, goal, since = min(self._over)
-        return Overdue(self._discs.goals[goal], since, tick)

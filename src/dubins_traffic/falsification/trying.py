@@ -13,8 +13,7 @@ from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.controllers import named
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.controllers.registry import COMPILED
-from dubins_traffic.engine.asking import ask_all, check_clear
-from dubins_traffic.engine.controlled import BatchController, Controlled, Maker, grouped
+from dubins_traffic.engine.controlled import BatchController, Controlled, Maker, ask_all, check_clear, grouped
 from dubins_traffic.engine.group import Group
 from dubins_traffic.engine.lanes_together import LanesTogether
 from dubins_traffic.engine.sharing import can_share, fitness, undisturbed

@@ -226,16 +226,20 @@ def _replay(bag: _Bag, run: _Run, instance: Instance, sink: Sink) -> None:
     ticks = min(instance.ticks, int((end - began + SLACK) * 1e-9 * rate + 1e-6))
     times = [began + round(tick * 1e9 / rate) for tick in range(ticks + 1)]
     contacts, events, ending = _notes(run, ticks)
-    labeller, buffer = Labeller([instance]), FrameBuffer(instance, [sink])
+    labeller, buffer = Labeller([instance]), FrameBuffer([instance], [[sink]])
     state = _state(bag, instance, times[0])
     labels = labeller.reset(state)
-    buffer.push(state, labels, np.zeros((1, len(instance.names), 2)), (), events.get(0, ()))
+    for event in events.get(0, ()):
+        buffer.note(event)
+    buffer.push(state, labels, np.zeros((1, len(instance.names), 2)))
     for tick, (before, now) in enumerate(pairwise(times), start=1):
         new = _state(bag, instance, now)
         for old, column in zip(state, new, strict=True):
             old[:] = column
-        touched = labeller.update(tick, state, [contacts.get(tick, ())])[0]
-        buffer.push(state, labels, _commands(bag, instance, before, state), touched, events.get(tick, ()))
+        buffer.touch(labeller.update(tick, state, [contacts.get(tick, ())])[0])
+        for event in events.get(tick, ()):
+            buffer.note(event)
+        buffer.push(state, labels, _commands(bag, instance, before, state))
     buffer.end(ending)
 
 

@@ -154,15 +154,15 @@ def _instance(message: instance_t, cars: list[car_t], ticks: int, number: int) -
 
 def _replay(trial: _Trial, instance: Instance, ticks: int, sink: Sink) -> None:
     """Label the frames as a trial does and hand them to the sink."""
-    labeller, buffer = Labeller([instance]), FrameBuffer(instance, [sink])
+    labeller, buffer = Labeller([instance]), FrameBuffer([instance], [[sink]])
     state = State.zeros(1, len(instance.names))
     _fill(state, trial.cars, 0)
     labels = labeller.reset(state)
-    buffer.push(state, labels, np.zeros((1, len(instance.names), 2)), (), ())
+    buffer.push(state, labels, np.zeros((1, len(instance.names), 2)))
     for tick in range(1, ticks + 1):
         _fill(state, trial.cars, tick)
         labeller.update(tick, state, [()])
-        buffer.push(state, labels, np.stack([state.speed, state.yaw_rate], axis=2), (), ())
+        buffer.push(state, labels, np.stack([state.speed, state.yaw_rate], axis=2))
     buffer.end(_ending(trial.end, ticks))
 
 

@@ -8,7 +8,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dubins_traffic.cars.sensing import scan
+from dubins_traffic.cars.sensing import scan, within_sight
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.observations.outlook import Outlook, OutlookTables
@@ -127,7 +127,7 @@ def _crossing(b: int, n: int, v: int, out: npt.NDArray[np.float32], tables: Outl
     out[place + 4] = 1.0 if tables.labels.at[b, n] == v else 0.0
     goal = 0.0
     for k in range(own.first_goal, own.last_goal):
-        if tables.goal[k].vertex == v and tables.goal[k].done == 0:
+        if tables.goal[k].vertex == v and tables.done[k] == 0:
             goal = 1.0
     out[place + 5] = goal
 
@@ -153,10 +153,8 @@ def _goal(b: int, n: int, own: Outlook, out: npt.NDArray[np.float32], tables: Ou
         _, _, tx, ty, _ = frame(roads, own.net, turn)
         out[place + 5] = within(c * tx + s * ty)
         out[place + 6] = within(c * ty - s * tx)
-    todo = 0
-    for k in range(own.first_goal, own.last_goal):
-        todo += 1 - tables.goal[k].done
-    out[place + 7] = todo / (own.last_goal - own.first_goal)
+    goals = own.last_goal - own.first_goal
+    out[place + 7] = (goals - own.goals) / goals
 
 
 @jit
@@ -169,7 +167,7 @@ def _nearest(b: int, n: int, shown: int, sight2: float, tables: OutlookTables) -
     for other in range(state.count[b]):
         dx, dy = state.x[b, other] - state.x[b, n], state.y[b, other] - state.y[b, n]
         d2 = dx * dx + dy * dy
-        if other != n and d2 <= sight2 and (count < shown or d2 < apart[count - 1]):
+        if other != n and within_sight(dx, dy, sight2) and (count < shown or d2 < apart[count - 1]):
             place = min(count, shown - 1)
             while place > 0 and apart[place - 1] > d2:
                 near[place] = near[place - 1]

@@ -39,6 +39,8 @@ class Outlook:
     """Visits of goals so far."""
     rounds: int
     """Rounds through all goals so far."""
+    goals: int
+    """Goals visited in the present round."""
     swept: int = -1
     """Number of the laser's last sweep, -1 before the first."""
     radius: float
@@ -61,8 +63,8 @@ class SoughtGoal:
 
     vertex: int
     """Its intersection."""
-    done: int
-    """1 if it has been visited in the present round."""
+    inside: int
+    """1 if the ego's centre has been in its disc last, of all discs."""
     fresh: int = 1
     """1 if coming into its disc is a visit: there was none yet, or the ego has been in another disc since."""
     route: int
@@ -96,6 +98,8 @@ class OutlookTables(Tables):
         Scales of each trial, and the goal that its ego seeks.
     goal : (G,) SoughtGoal
         The goals of one trial after another, each once.
+    done : (G,)
+        1 for the goals that have been visited in the present round.
     metres : (M, L)
         Distance from the start of each lane to a goal, for each distinct pair of network and goal; inf for no way.
     near : (K,)
@@ -117,6 +121,7 @@ class OutlookTables(Tables):
     roads: RoadTable
     trial: Rows[Outlook]
     goal: Rows[SoughtGoal]
+    done: Ints
     metres: Floats
     near: Ints
     apart: Floats
@@ -158,7 +163,8 @@ def new_outlook(
     goal, metres = _goals(problems, trial)
     laser, rays = _laser(problems[0])
     return OutlookTables(
-        state=state, labels=labels, roads=roads, trial=trial, goal=goal, metres=metres,
+        state=state, labels=labels, roads=roads, trial=trial, goal=goal,
+        done=np.zeros(len(goal), dtype=np.int64), metres=metres,
         near=np.zeros(max(1, shown), dtype=np.int64), apart=np.zeros(max(1, shown)),
         laser=laser, rays=rays, ranges=np.full((len(problems), len(rays)), np.inf),
         around=Surroundings(state, cars, obstacles),

@@ -1,8 +1,7 @@
 """Which goal a car seeks, and how far it is to it along lanes (compiled).
 
-A car seeks the goal of its present round that is nearest along lanes when it has visited the one before; visits are
-those of docs/rules.md. Inside a disc there is no lane state: from there the way leads straight to where a road leaves
-the disc, and on along that road.
+A car seeks the goal of its present round that is nearest along lanes when it has visited the one before. Inside a disc
+there is no lane state: from there the way leads straight to where a road leaves the disc, and on along that road.
 """
 
 from __future__ import annotations
@@ -15,6 +14,7 @@ from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.observations.outlook import OutlookTables
 from dubins_traffic.roads.lookup import lane_direction_at, lane_end
 from dubins_traffic.routing.lane_graph import foot, frame
+from dubins_traffic.rules.visits import begins_visit, come_by, do_goal, finish_round
 
 
 @jit_inline
@@ -102,7 +102,7 @@ def seek(b: int, tables: OutlookTables) -> int:
     if at >= 0 and at != own.last_at:
         visited = _come_into(b, at, tables)
         own.last_at = at
-    if own.target < 0 or tables.goal[own.target].done != 0 or visited != 0:
+    if own.target < 0 or tables.done[own.target] != 0 or visited != 0:
         _choose(b, tables)
     return visited
 
@@ -111,21 +111,16 @@ def seek(b: int, tables: OutlookTables) -> int:
 def _come_into(b: int, at: int, tables: OutlookTables) -> int:
     """Note that the ego has come into the disc of `at`; return the number of goals that it visits thereby."""
     own = tables.trial[b]
-    visited, done = 0, 1
+    visited = 0
     for row in range(own.first_goal, own.last_goal):
         goal = tables.goal[row]
-        if goal.vertex != at:
-            goal.fresh = 1
-        elif goal.fresh != 0:
-            goal.fresh = 0
-            goal.done = 1
+        come_by(at, goal)
+        if begins_visit(goal.vertex == at, goal):
             visited += 1
-        done &= goal.done
+            do_goal(row, tables.done, own)
     own.visits += visited
-    if visited != 0 and done != 0:
-        own.rounds += 1
-        for row in range(own.first_goal, own.last_goal):
-            tables.goal[row].done = 0
+    if visited != 0:
+        finish_round(own.first_goal, own.last_goal, tables.done, own)
     return visited
 
 
@@ -136,7 +131,7 @@ def _choose(b: int, tables: OutlookTables) -> None:
     own.target = -1
     least = INFINITE
     for row in range(own.first_goal, own.last_goal):
-        if tables.goal[row].done == 0:
+        if tables.done[row] == 0:
             metres = metres_to_goal(b, EGO, row, tables)
             if own.target < 0 or metres < least:
                 own.target = row

@@ -113,9 +113,7 @@ def keeps_clear(pose: Pose, command: Command, car: Mover, other: Box, travel: fl
         return True
     x, y, c, s = pose
     way = 1.0 if command.speed > 0.0 else -1.0
-    ahead = way * ((other.x - x) * c + (other.y - y) * s) + half_extent(
-        c, s, other.c, other.s, other.half_length, other.half_width, other.rounding
-    )
+    ahead = way * ((other.x - x) * c + (other.y - y) * s) + half_extent(c, s, other.c, other.s, other)
     return command.yaw_rate == 0.0 and ahead + travel <= -car.half_length
 
 

@@ -24,7 +24,7 @@ from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.problem.obstructions import check_obstructions
 from dubins_traffic.problem.parts import CarModel, ObstacleModel
-from dubins_traffic.problem.rule_preconditions import check_demands
+from dubins_traffic.problem.preconditions import check_demands
 from dubins_traffic.problem.settings import INSTANCE_0_KEYS, InstanceModel, InstanceModel0
 from dubins_traffic.problem.starts import Ground, Wish, areas_of, check_given, draw_starts
 from dubins_traffic.problem.versions import version_of

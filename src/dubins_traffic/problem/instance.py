@@ -14,8 +14,8 @@ from dubins_traffic.cars.read_only import read_only
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import Pictured, count
 from dubins_traffic.problem import limits
-from dubins_traffic.problem.curve_preconditions import check_curves
 from dubins_traffic.problem.faults import Strict, fault
+from dubins_traffic.problem.preconditions import check_curves
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork

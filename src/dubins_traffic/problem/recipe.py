@@ -22,7 +22,7 @@ from dubins_traffic.problem.drawing import (
 from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.problem.obstructions import check_obstructions
-from dubins_traffic.problem.rule_preconditions import check_demands
+from dubins_traffic.problem.preconditions import check_demands
 from dubins_traffic.problem.starts import Areas, Ground, Wish, areas_of, check_given, draw_starts
 from dubins_traffic.roads.clearance import LEAST_RADIUS, SEGMENT_SLACK
 from dubins_traffic.roads.formats.rnd import grid_segments

@@ -12,7 +12,7 @@ from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.obstacles import ObstacleLanes
-from dubins_traffic.rules.shape import half_extent
+from dubins_traffic.rules.shape import half_across
 from dubins_traffic.rules.tables import TrialRules
 
 
@@ -39,7 +39,7 @@ def place_in_lane(
     x, y = state.x[b, k], state.y[b, k]
     progress, lateral = lane_coordinates(t, own.net, lane, x, y)
     tx, ty = lane_direction_at(t, own.net, lane, x, y)
-    half = half_extent(tx, ty, state.c[b, k], state.s[b, k], own.half_length, own.half_width, own.rounding)
+    half = half_across(b, k, tx, ty, state, own)
     return progress, lateral - half, lateral + half
 
 

@@ -11,7 +11,7 @@ from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at, lan
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
 from dubins_traffic.rules.breach_log import RefereeParameters, RefereeTables
-from dubins_traffic.rules.shape import half_extent
+from dubins_traffic.rules.shape import half_across
 from dubins_traffic.rules.tables import GRAIN, TrialRules
 
 
@@ -80,7 +80,7 @@ def _takes(b: int, k: int, lane: int, along: float, lateral: float, tables: Refe
     if labels.lane[b, k] != lane ^ 1 and -own.lane_width - GRAIN <= lateral <= GRAIN:
         return True
     tx, ty = lane_direction_at(roads, own.net, lane, state.x[b, k], state.y[b, k])
-    half = half_extent(tx, ty, state.c[b, k], state.s[b, k], own.half_length, own.half_width, own.rounding)
+    half = half_across(b, k, tx, ty, state, own)
     return narrows(lateral - half, lateral + half, own.lane_width, own.free_needed + GRAIN)
 
 

@@ -148,7 +148,7 @@ def _reach(
         half = own.rounding
         if not round_body:
             tx, ty = lane_direction_at(t, net, lane, pose.x, pose.y)
-            half = half_extent(tx, ty, pose.c, pose.s, own.half_length, own.half_width, half)
+            half = half_extent(tx, ty, pose.c, pose.s, own)
         reach = car.lateral + half
         end = lane_end(t, net, lane)
         if t.degree[t.vert_off[net] + end] >= own.crossing_degree:

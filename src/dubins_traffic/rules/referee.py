@@ -249,9 +249,7 @@ class Referee:
                 f"frames must follow one another: got a block from frame {frames.first} on before frame 0"
             )
         self._next += len(frames)
-        columns = (frames.x, frames.y, frames.c, frames.s, frames.speed, frames.yaw_rate)
-        x, y, c, s, speed, yaw_rate = (np.ascontiguousarray(column) for column in columns)
-        poses = State(x, y, c, s, speed, yaw_rate, self._state.count)
+        poses, _ = frames.states
         before = own.labels.bits[0].copy()
         bits = np.zeros(frames.x.shape, dtype=np.uint32)
         breaches: list[Breach] = []

@@ -16,6 +16,7 @@ from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG, NAMES
 from dubins_traffic.rules.referee import Breach, Referee
+from dubins_traffic.rules.visits import visited_place, visits_in
 from dubins_traffic.rules.vocabulary import (
     AT,
     FREE,
@@ -100,7 +101,7 @@ class Valuation:
         judged = any(proposition.word in OF_JUDGED for proposition in self._wanted)
         self._referee = Referee([instance], self._labeller) if judged else None
         self._asks_for_ways = any(proposition.word == "way" for proposition in self._wanted)
-        self._visits = {own: _Visits(own.place) for own in self._wanted if own.word == VISIT}
+        self._visits = {own: visited_place(own.place) for own in self._wanted if own.word == VISIT}
         self._exceptions = Exceptions(self._rules, problem.rate)
         network = problem.network
         self._ends = np.array([network.lane_ends(lane)[1] for lane in range(network.lanes)] + [-1])
@@ -193,7 +194,7 @@ class Valuation:
     def _of_intersection(self, scene: _Scene, wanted: Proposition) -> Mask:
         word, car, place = wanted
         if word == VISIT:
-            return self._visits[wanted].values(scene.at[:, car])
+            return visits_in(scene.at[:, car], self._visits[wanted]) != 0
         if place < 0:
             return scene.bits[:, car] & NAMES[word] != 0
         crosses = scene.crosses == place
@@ -202,31 +203,6 @@ class Valuation:
         if word == "enter":
             return crosses[:, car] & (scene.bits[:, car] & FLAG.ENTERED != 0)
         return crosses[:, car]
-
-
-class _Visits:
-    """Finds the frames in which a car's visits of an intersection begin, block by block (docs/rules.md#visit).
-
-    Parameters
-    ----------
-    place : int
-        Number of the intersection.
-    """
-
-    def __init__(self, place: int) -> None:
-        self._place = place
-        self._inside = False
-        self._fresh = True
-
-    def values(self, at: Ints) -> Mask:
-        """Return in which frames of the next block one begins; `at` (F,) are the discs that hold the centre."""
-        found = np.zeros(len(at), dtype=np.bool_)
-        for row, v in enumerate(at.tolist()):
-            inside = v == self._place
-            found[row] = inside and not self._inside and self._fresh
-            self._fresh = (self._fresh and not inside) or (v >= 0 and not inside)
-            self._inside = inside
-        return found
 
 
 def _of_e1(breach: Breach) -> bool:

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from dubins_traffic.cars.state import EGO, Contact, Frames
-from dubins_traffic.problem.instance import Instance
-from dubins_traffic.record.sink import Ending
+from dubins_traffic.cars.state import EGO, Contact
 from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 
@@ -39,39 +37,19 @@ class Collision:
         }
 
 
-class Collisions:
-    """Lists the collisions of the ego and counts those among others."""
-
-    def begin(self, instance: Instance) -> None:
-        """Start an empty list."""
-        self._names = instance.names
-        self._found: list[Collision] = []
-        self.among_others = 0
-
-    def frames(self, frames: Frames) -> None:
-        """Take the contacts of a block."""
-        self.take(frames.contacts)
-
-    def take(self, contacts: Sequence[Contact]) -> None:
-        """Take the next contacts."""
-        for contact in contacts:
-            if EGO not in (contact.car, contact.other):
-                self.among_others += 1
-                continue
-            fault, partner_fault = contact.at_fault
-            other = contact.other
-            if other == EGO:
-                other, fault, partner_fault = contact.car, partner_fault, fault
-            partner = self._names[other] if other >= 0 else f"obstacle {-1 - other}"
-            ego = self._names[EGO]
-            self._found.append(Collision(contact.time, contact.tick, ego, partner, fault, partner_fault))
-
-    def end(self, ending: Ending) -> None:
-        """Nothing is left to do."""
-
-    def result(self) -> tuple[Collision, ...]:
-        """Return the ego's collisions in order of time."""
-        return tuple(self._found)
+def collisions_of(names: Sequence[str], contacts: Sequence[Contact]) -> tuple[tuple[Collision, ...], int]:
+    """Return the collisions of the ego among `contacts`, in their order, and the number of those among others."""
+    found: list[Collision] = []
+    for contact in contacts:
+        if EGO not in (contact.car, contact.other):
+            continue
+        fault, partner_fault = contact.at_fault
+        other = contact.other
+        if other == EGO:
+            other, fault, partner_fault = contact.car, partner_fault, fault
+        partner = names[other] if other >= 0 else f"obstacle {-1 - other}"
+        found.append(Collision(contact.time, contact.tick, names[EGO], partner, fault, partner_fault))
+    return tuple(found), len(contacts) - len(found)
 
 
 def _faults(collisions: Sequence[Collision], *, ego: bool, other: bool) -> int:

@@ -7,7 +7,6 @@ from typing import Final
 
 from dubins_traffic.scoring import (
     breaches,
-    clearance,
     collisions,
     driving,
     duration,
@@ -23,7 +22,6 @@ _PARTS = (
     duration.COLUMNS,
     goals.COLUMNS,
     driving.COLUMNS,
-    clearance.COLUMNS,
     collisions.COLUMNS,
     interventions.COLUMNS,
     formulas.COLUMNS,

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.scoring.metric import Column, ScoreColumn
+
+if TYPE_CHECKING:
+    from dubins_traffic.scoring.counts import RoundCount
 
 
 def planned_ticks(instance: Instance) -> int:
@@ -31,12 +36,13 @@ def ran_whole(instance: Instance, ending: Ending | None, last: int) -> bool:
     )
 
 
-def early_rounds(rounds: float, ending: Ending | None) -> float:
-    """Return the rounds before the first breach that rank: 0 if the controller ended it.
+def early_rounds(early: RoundCount, goals: int, ending: Ending | None) -> float:
+    """Return the rounds before the first breach, with the share of the `goals` goals of the round begun.
 
-    Norm: docs/rules.md#before-breach.
+    0 without goals, or if the controller ended the trial. Norm: docs/rules.md#before-breach.
     """
-    return 0.0 if ending is not None and ending.by_controller else rounds
+    by_controller = ending is not None and ending.by_controller
+    return early.rounds + early.goals / goals if goals and not by_controller else 0.0
 
 
 COLUMNS = (

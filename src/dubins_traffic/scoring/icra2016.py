@@ -17,15 +17,13 @@ description are kept, since published scores rest on them:
 
 from __future__ import annotations
 
-import numpy as np
+from typing import TYPE_CHECKING
 
-from dubins_traffic.cars.state import EGO, Frames
-from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.record.sink import Ending
-from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.scoring.goals import GoalDiscs, Rounds
 from dubins_traffic.scoring.metric import Column, ScoreColumn
+
+if TYPE_CHECKING:
+    from dubins_traffic.scoring.counts import TrialCounts
 
 COLLISION_DISTANCE = 0.36
 """Centres closer than this are a collision, metres."""
@@ -52,94 +50,27 @@ def weight_of(instance: Instance) -> int | None:
     return agents * rows * columns
 
 
-class Icra2016:
-    """The score of one trial: -1 after a collision, else e-agents * rows * columns * rounds / max(1, s off road).
+def icra2016_of(instance: Instance, counts: TrialCounts, rounds: int, samples: int) -> float | None:
+    """Return the score of a trial: -1 after a collision, else e-agents * rows * columns * rounds / max(1, s off road).
 
     None where the formula does not apply.
+
+    Parameters
+    ----------
+    instance : Instance
+        What was run.
+    counts : TrialCounts
+        The counts of the trial.
+    rounds, samples : int
+        Rounds counted at samples, and the number of samples: without goals each is a round.
     """
-
-    def begin(self, instance: Instance) -> None:
-        """Start counting."""
-        problem = instance.problem
-        self._agents = [n for n, name in enumerate(instance.names) if n != EGO and counts(name)]
-        self._weight = weight_of(instance)
-        self._rate = problem.rate
-        self._road = _Road(problem.network)
-        self._discs = GoalDiscs(instance)
-        self._rounds = Rounds(len(self._discs.goals))
-        self._samples = 0
-        self._collision = False
-        self._off_since: int | None = None
-        self._off_ticks = 0
-
-    def frames(self, frames: Frames) -> None:
-        """Take a block of frames; each is a sample."""
-        if not len(frames):
-            return
-        self._samples += len(frames)
-        self._rounds.add(self._discs.inside(frames))
-        if self._agents and not self._collision:
-            x = frames.x[:, self._agents] - frames.x[:, EGO, None]
-            y = frames.y[:, self._agents] - frames.y[:, EGO, None]
-            self._collision = bool((np.sqrt(x * x + y * y) < COLLISION_DISTANCE).any())
-        self._count_off_road(frames.first, self._road.holds(frames))
-
-    def end(self, ending: Ending) -> None:
-        """Nothing is left to do."""
-
-    @property
-    def rounds(self) -> int:
-        """X: rounds counted at samples."""
-        return self._rounds.count if self._discs.goals else self._samples
-
-    @property
-    def off_road_s(self) -> float:
-        """Seconds off the road, as counted here."""
-        return self._off_ticks / self._rate
-
-    def result(self) -> float | None:
-        """Return the score up to the last frame, None where it is not defined."""
-        if self._weight is None:
-            return None
-        if self._collision:
-            return COLLISION_SCORE
-        return self._weight * self.rounds / max(1.0, self.off_road_s)
-
-    def _count_off_road(self, first: int, on: np.ndarray) -> None:
-        was_on = np.concatenate([[self._off_since is None], on[:-1]])
-        for at in np.flatnonzero(on != was_on).tolist():
-            if self._off_since is None:
-                self._off_since = first + at
-            else:
-                self._off_ticks += first + at - self._off_since
-                self._off_since = None
-
-
-class _Road:
-    """All segments as rectangles without ends."""
-
-    def __init__(self, network: RoadNetwork) -> None:
-        self._start: Floats = np.asarray(network.points)[np.asarray(network.ends)[:, 0]]
-        self._tangent: Floats = np.asarray(network.tangents)
-        self._length: Floats = np.asarray(network.lengths)
-
-    def holds(self, frames: Frames) -> np.ndarray:
-        """Return whether the ego is on any segment at each frame, (F,): the nearest first, then the rest."""
-        point = np.stack([frames.x[:, EGO], frames.y[:, EGO]], axis=1)
-        nearest = np.clip(frames.segment[:, EGO], 0, len(self._length) - 1)
-        on = self._on(point, nearest)
-        rest = np.flatnonzero(~on)
-        if len(rest):
-            every = np.arange(len(self._length))
-            on[rest] = self._on(point[rest, None, :], every).any(axis=1)
-        return on
-
-    def _on(self, point: Floats, segment: np.ndarray) -> np.ndarray:
-        step = point - self._start[segment]
-        tangent = self._tangent[segment]
-        along = step[..., 0] * tangent[..., 0] + step[..., 1] * tangent[..., 1]
-        beside = step[..., 0] * tangent[..., 1] - step[..., 1] * tangent[..., 0]
-        return (along >= 0.0) & (along <= self._length[segment]) & (np.abs(beside) <= ROAD_HALF_WIDTH)
+    weight = weight_of(instance)
+    if weight is None:
+        return None
+    if counts.collided:
+        return COLLISION_SCORE
+    rounds = rounds if counts.last_goal > counts.first_goal else samples
+    return weight * rounds / max(1.0, counts.off_ticks / instance.problem.rate)
 
 
 COLUMNS = (

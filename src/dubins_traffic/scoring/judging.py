@@ -1,114 +1,156 @@
-"""Judges a trial by the rules of the road from its frames."""
+"""Counts and judges one trial whose frames come in blocks, live or from a record."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import Frames
+from dubins_traffic.cars.near import unknown_spacing
+from dubins_traffic.cars.state import EGO, Contact, Frames, Labels, State
+from dubins_traffic.cars.tables import pack_cars, pack_obstacles
+from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.records import table
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.problem.rule_preconditions import check_demands
+from dubins_traffic.problem.preconditions import check_demands
 from dubins_traffic.record.sink import Ending
+from dubins_traffic.roads.table import pack
+from dubins_traffic.rules.breach_log import EntryMargins
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.referee import NOTHING
-from dubins_traffic.scoring.collisions import Collisions
-from dubins_traffic.scoring.duration import ran_whole
-from dubins_traffic.scoring.goals import Visiting
-from dubins_traffic.scoring.margins import ENTERED, Margins, entries_by_rule
-from dubins_traffic.scoring.verdict import Verdict, reach_verdict
+from dubins_traffic.rules.referee import NOTHING, Referee
+from dubins_traffic.scoring.collisions import collisions_of
+from dubins_traffic.scoring.findings import Findings
+from dubins_traffic.scoring.margins import EgoFrame, EgoMargins, margin_rules
+from dubins_traffic.scoring.tally import Counted, count_frames, new_tally, tally_margins
 
 if TYPE_CHECKING:
     from dubins_traffic.rules.referee import Breach
+    from dubins_traffic.scoring.verdict import Verdict
+
+NEVER = 1 << 62
+"""A frame that no trial comes to."""
 
 
 class Judging:
-    """A sink that judges a trial whose problem carries rules.
+    """A sink that counts a trial and judges it if its problem carries rules.
 
-    Labels and faults are found again from the poses, so that every trial is judged by this code, whatever recorded it.
+    Breaches and faults are found again from the poses, so that every trial is judged by this code, whatever recorded
+    it.
+
+    Attributes
+    ----------
+    visits : list of (int, int)
+        Frame and goal of each visit so far, in order; goals are numbered as in the document, each once.
     """
 
     def begin(self, instance: Instance) -> None:
-        """Start without a breach.
+        """Start without a frame.
 
         Raises
         ------
         InputError
             If the problem asks for the rules and they are not defined on its roads; the message names the place.
         """
-        problem = instance.problem
+        problem, cars = instance.problem, len(instance.names)
         self._instance = instance
-        self._referee = None
-        if not problem.rules:
-            return
         self._rules = RuleParameters.from_mapping(problem.rules)
-        check_demands(
-            problem.network,
-            problem.intersection_radius,
-            problem.car,
-            problem.sensing_radius,
-            self._rules.to_mapping(),
+        self._referee = None
+        if problem.rules:
+            check_demands(
+                problem.network,
+                problem.intersection_radius,
+                problem.car,
+                problem.sensing_radius,
+                self._rules.to_mapping(),
+            )
+            self._referee = Referee([instance])
+        self._only: Ints = np.zeros(1, dtype=np.int64)
+        self._counted = Counted(
+            state=State.zeros(1, cars),
+            labels=Labels.zeros(1, cars),
+            roads=pack([problem.network], [problem.car.lane_width]),
+            cars=pack_cars([problem.car]),
+            obstacles=pack_obstacles([problem.obstacles]),
+            spacing=unknown_spacing(1, cars),
+            tally=new_tally([instance], self._only, cars),
         )
-        from dubins_traffic.rules.referee import Referee  # compiles; only where there is something to judge
-
-        self._referee = Referee([instance])
+        self._count = bound(count_frames)
+        self.visits: list[tuple[int, int]] = []
         self._breaches: list[Breach] = []
-        self._sensed = [np.zeros((0, len(instance.names)), dtype=bool)]
-        self._visiting = Visiting()
-        self._visiting.begin(instance)
-        self._collisions = Collisions()
-        self._collisions.begin(instance)
-        self._margins = Margins()
-        self._margins.begin(instance)
+        self._contacts: list[Contact] = []
+        self._seen: set[tuple[int, int]] = set()
         self._ending: Ending | None = None
+        self._seal = NEVER
         self._last = -1
 
     def frames(self, frames: Frames) -> None:
-        """Judge a block of frames."""
-        if self._referee is None:
-            return
-        breaches, contacts = self._referee.judge(frames)
+        """Count and judge a block of frames."""
+        contacts, breaches = frames.contacts, list["Breach"]()
+        if self._referee is not None:
+            breaches, contacts = self._referee.judge(frames)
         self._breaches += breaches
-        self._collisions.frames(replace(frames, contacts=contacts))
-        self._visiting.frames(frames)
-        self._margins.frames(frames)
-        if len(frames):
-            dx, dy = frames.x - frames.x[:, :1], frames.y - frames.y[:, :1]
-            radius = self._instance.problem.sensing_radius
-            self._sensed.append(dx * dx + dy * dy <= radius * radius)
-            self._last = frames.first + len(frames) - 1
+        self._contacts += contacts
+        if not len(frames):
+            return
+        hits = [contact.tick for contact in contacts if EGO in (contact.car, contact.other)]
+        own = [breach.tick for breach in breaches if breach.car == EGO]
+        if hits:
+            self._counted.tally.trial[0].clearance = 0.0
+        self._seal = min([self._seal, *hits, *own])
+        seen = self._counts(frames)
+        self._seen.update(
+            (one.car, one.tick)
+            for one in breaches
+            if one.car != EGO and seen[one.tick - frames.first, one.car]
+        )
+        self._last = frames.first + len(frames) - 1
+
+    def _counts(self, frames: Frames) -> Ints:
+        """Count a block; return which cars the ego senses in each of its frames, (F, N)."""
+        tally = self._counted.tally
+        needed, room = frames.first + len(frames), tally.ego.shape[1]
+        if needed > room:
+            longer: Any = table(EgoFrame, (1, needed))
+            longer[:, :room] = tally.ego
+            self._counted = self._counted.replace(tally=tally.replace(ego=longer))
+        begun = np.zeros((len(frames), len(tally.goal)), dtype=np.int64)
+        seen = np.zeros(frames.x.shape, dtype=np.int64)
+        self._count(frames.first, self._seal, *frames.states, begun, seen, self._counted)
+        self.visits += [(frames.first + f, goal) for f, goal in np.argwhere(begun).tolist()]
+        return seen
 
     def end(self, ending: Ending) -> None:
         """Keep the ending: only a trial that ran its whole duration can be satisfied."""
         self._ending = ending
 
-    def result(self) -> Verdict | None:
-        """Return the verdict up to the last frame, None if the problem carries no rules."""
-        if self._referee is None:
-            return None
-        return reach_verdict(
-            self._instance,
-            self._rules,
-            self._breaches,
-            self._collisions.result(),
-            self._visiting.result(),
-            self._visiting.now,
-            self._was_sensed,
-            lambda car, tick: self._was_sensed(car, tick, tick),
-            self._referee.pending[0] if self._last >= 0 else NOTHING,
-            self._margins.result() | self._entries(),
-            whole=ran_whole(self._instance, self._ending, self._last),
-            by_controller=self._ending is not None and self._ending.by_controller,
+    def findings(self) -> Findings:
+        """Return what has been found up to the last frame."""
+        judged = self._referee if self._last >= 0 else None
+        margins = table(EgoMargins, 1)
+        if judged is not None:
+            counted, rules = (
+                self._counted,
+                margin_rules([self._rules], [self._instance.problem.period], self._only),
+            )
+            count = np.array([self._last + 1])
+            margins = tally_margins(self._only, count, counted.tally, rules, counted.roads, counted.cars)
+        return Findings(
+            instance=self._instance,
+            rules=self._rules,
+            ending=self._ending,
+            last=self._last,
+            tally=self._counted.tally,
+            row=0,
+            contacts=self._contacts,
+            breaches=self._breaches,
+            seen=self._seen,
+            running=NOTHING if judged is None else judged.pending[0],
+            margins=margins[0],
+            entry=table(EntryMargins, 1)[0] if judged is None else judged.entries[0],
         )
 
-    def _entries(self) -> dict[str, float | None]:
-        """Return the margins of rule 3."""
-        if self._referee is None or self._last < 0:
-            return dict.fromkeys(ENTERED)
-        return entries_by_rule(self._referee.entries[0], self._instance.problem.period)
-
-    def _was_sensed(self, car: int, first: int, last: int) -> bool:
-        if len(self._sensed) > 1:
-            self._sensed = [np.concatenate(self._sensed)]
-        return bool(self._sensed[0][first : last + 1, car].any())
+    def result(self) -> Verdict | None:
+        """Return the verdict up to the last frame, None if the problem carries no rules."""
+        found = self.findings()
+        return found.verdict(found.visits, collisions_of(self._instance.names, self._contacts)[0])

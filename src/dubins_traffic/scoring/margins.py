@@ -1,26 +1,38 @@
-"""Margins: by how much the ego keeps or breaks each rule."""
+"""Margins: by how much the ego keeps or breaks each rule, the least value over its frames (partly compiled).
+
+They are the robustness of its rules (`logic.robustness`). The signals of rules 1 and 2, in metres, are the gap to the
+nearest other body, the distance of the centre to the edge of the road, and how far the body reaches beyond the line at
+which `left` rises (or, once it has risen, falls); `overtaking` and `hemmed` are infinite; that of `turned` is how much
+farther the ego could have backed. The robustness of ``[] (left -> overtaking)`` is the least margin to the line while
+the ego does not overtake, that of ``[] (left -> <>[0,d] (!left | hemmed))`` the least of the greatest margins within d.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, Final, Protocol
+from math import sqrt
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Frames
-from dubins_traffic.cars.tables import pack_cars
-from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.records import table
-from dubins_traffic.problem.instance import Instance
-from dubins_traffic.record.sink import Ending
-from dubins_traffic.roads.table import pack
-from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.scoring.clearance import Clearance
+from dubins_traffic.cars.tables import CarTable
+from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
+from dubins_traffic.kernels.boxes import Box
+from dubins_traffic.kernels.compile import jit
+from dubins_traffic.kernels.records import Grid, Rows, record, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.logic.temporal import ticks
+from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction_at, nearest_segment
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.rules.shape import half_extent
 from dubins_traffic.scoring.verdict import EGO_NAME, Verdict
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
     from dubins_traffic.rules.breach_log import EntryMargins
+    from dubins_traffic.rules.parameters import RuleParameters
 
 MEASURED: Final = ("1.road", "2.left", "2.return", "2.turn")
 """The rules whose margins `find_margins` finds, in the order of `EgoMargins`."""
@@ -35,6 +47,189 @@ SURE: Final = 1e-9
 """Least absolute value of a margin in `margins_of`, with the sign of the verdict."""
 
 
+@record
+class MarginRules:
+    """The parameters on which the margins of one trial depend."""
+
+    left_set: float
+    left_release: float
+    """Where `left` rises and where it falls, metres."""
+    turn_back: float
+    """How far progress falls before a lane state flips, metres."""
+    window: int
+    """Ticks within which the ego must be back."""
+
+
+@record
+class EgoFrame:
+    """The ego in one frame."""
+
+    x: float
+    """Where its centre is, metres."""
+    y: float
+    """Where its centre is, metres."""
+    c: float
+    """Cosine of its heading."""
+    s: float
+    """Sine of its heading."""
+    bits: int
+    """Its flags (`rules.propositions`)."""
+    lane: int
+    """Its lane state."""
+
+
+@record
+class EgoMargins:
+    """The margins of one trial, metres; infinite where nothing could break the rule."""
+
+    road: float = np.inf
+    line: float = np.inf
+    back: float = np.inf
+    turn: float = np.inf
+    """The margins of 1.road, 2.left, 2.return and 2.turn."""
+
+
+class MarginTables(Tables):
+    """The tables from which a batch's margins are found: `rules` (B,), `roads`, `cars`; `signal` (F,) is scratch."""
+
+    rules: Rows[MarginRules]
+    roads: RoadTable
+    cars: CarTable
+    signal: Floats
+
+
+def margin_rules(rules: Sequence[RuleParameters], periods: Sequence[float], index: Ints) -> Rows[MarginRules]:
+    """Return the parameters of the margins of trials; trial b has the rules and the period (s) of number index[b]."""
+    found: Any = table(MarginRules, len(index))
+    numbers: list[int] = index.tolist()
+    found["left_set"] = [rules[k].left_set for k in numbers]
+    found["left_release"] = [rules[k].left_release for k in numbers]
+    found["turn_back"] = [rules[k].turn_back for k in numbers]
+    found["window"] = [ticks(rules[k].left_time, periods[k]) for k in numbers]
+    return found
+
+
+@jit
+def find_margins(
+    trials: Ints,
+    frames: Ints,
+    ego: Grid[EgoFrame],
+    nets: Ints,
+    tables: MarginTables,
+    found: Rows[EgoMargins],
+) -> None:
+    """Write the margins of some trials into `found` (B,).
+
+    Parameters
+    ----------
+    trials, frames : (K,)
+        Numbers of the trials, and of frames that each has.
+    ego : (B, F)
+        The ego in each frame.
+    nets : (B,)
+        Number of each trial's road network.
+    tables
+        The tables of all trials; `signal` has room for the frames of any.
+    found : (B,)
+        The margins, written in place.
+    """
+    for k in range(trials.shape[0]):
+        b: int = trials[k]
+        _find_margin(b, frames[k], ego[b], nets[b], tables, found[b])
+
+
+@jit
+def _find_margin(
+    b: int, frames: Any, ego: Rows[EgoFrame], net: Any, tables: MarginTables, found: EgoMargins
+) -> None:
+    roads, signal = tables.roads, tables.signal
+    half_road = roads.half_width[net]
+    begun = False
+    line = INFINITE
+    segment = 0
+    farthest = -1.0
+    for f in range(frames):
+        own = ego[f]
+        x, y, bits = own.x, own.y, own.bits
+        if bits & FLAG.ON_ROAD != 0:
+            begun = True
+        # The nearest segment is no farther than the one of the frame before, so often none need be searched.
+        if begun and distance2(roads, net, segment, x, y) > farthest:
+            segment, square = nearest_segment(roads, net, x, y)
+            farthest = max(farthest, square)
+        right = -_beyond(b, own, net, tables)
+        signal[f] = right if bits & FLAG.HEMMED == 0 else INFINITE
+        if bits & FLAG.OVERTAKING == 0:
+            line = min(line, right)
+    found.road = float(half_road) - sqrt(farthest) if begun else INFINITE
+    found.line = line
+    found.back = _least_of_greatest(signal, frames, tables.rules[b].window)
+    found.turn = _least_way_back(frames, ego, net, tables.rules[b].turn_back, roads)
+
+
+@jit
+def _least_way_back(frames: Any, ego: Rows[EgoFrame], net: Any, turn_back: float, roads: RoadTable) -> float:
+    """Return the least distance, metres, by which the ego could have backed farther without turning round.
+
+    It is negative, or 0, in a frame in which it turned; infinite without a lane state (docs/rules.md#lane-state).
+    """
+    least = INFINITE
+    reference = 0.0
+    before = -1
+    overtook = False
+    for f in range(frames):
+        own = ego[f]
+        lane = own.lane
+        if lane >= 0:
+            turned = own.bits & FLAG.TURNED != 0
+            came = lane ^ 1 if turned else lane
+            progress, _ = lane_coordinates(roads, net, came, own.x, own.y)
+            if came != before or (not overtook and progress > reference):
+                reference = progress
+            least = min(least, turn_back - (reference - progress))
+            if turned:
+                reference, _ = lane_coordinates(roads, net, lane, own.x, own.y)
+        before = lane
+        overtook = own.bits & FLAG.OVERTAKING != 0
+    return least
+
+
+@jit
+def _beyond(b: int, ego: EgoFrame, net: Any, tables: MarginTables) -> Any:
+    """Return how far the body reaches over the line at which `left` changes, metres; -inf without lane state."""
+    roads, cars, own = tables.roads, tables.cars, tables.rules[b]
+    lane = ego.lane
+    if lane < 0:
+        return -INFINITE
+    tx, ty = lane_direction_at(roads, net, lane, ego.x, ego.y)
+    body = Box(ego.x, ego.y, ego.c, ego.s, cars.half_length[b], cars.half_width[b], cars.rounding[b])
+    half = half_extent(tx, ty, ego.c, ego.s, body)
+    _, lateral = lane_coordinates(roads, net, lane, ego.x, ego.y)
+    risen = ego.bits & FLAG.LEFT != 0
+    return lateral + half - (own.left_release if risen else own.left_set)
+
+
+@jit
+def _least_of_greatest(signal: Floats, count: Any, window: Any) -> Any:
+    """Return the least, over all frames, of the greatest value at the frame and up to `window` frames after it.
+
+    Spans that the last frame cuts short count with the frames they have. A span can lower the least only if all of its
+    values lie below it, so its greatest value is searched only then.
+    """
+    least = signal[count - 1]
+    high = -1
+    for f in range(count):
+        if signal[f] >= least:
+            high = f
+        elif f - high > window:
+            high = f - window
+            for g in range(high + 1, f + 1):
+                if signal[g] >= signal[high]:
+                    high = g
+            least = signal[high]
+    return least
+
+
 class Judged(Protocol):
     """What `margins_of` reads of a score (`scoring.score.Score`)."""
 
@@ -47,66 +242,6 @@ class Judged(Protocol):
     def goals_visited(self) -> float:
         """Share of the goals that were visited."""
         ...
-
-
-class Margins:
-    """The robustness of the ego's rules 1 and 2 (`logic.robustness`), in metres.
-
-    The signals are the gap to the nearest other body, the distance of the centre to the edge of the road, and how far
-    the body reaches beyond the line at which `left` rises (or, once it has risen, falls); `overtaking` and `hemmed` are
-    infinite; that of `turned` is how much farther the ego could have backed. The robustness of
-    ``[] (left -> overtaking)`` is the least margin to the line while the ego does not overtake, that of
-    ``[] (left -> <>[0,d] (!left | hemmed))`` the least of the greatest margins within d.
-    """
-
-    def begin(self, instance: Instance) -> None:
-        """Start without a frame."""
-        self._problem = instance.problem
-        self._clearance = Clearance()
-        self._clearance.begin(instance)
-        self._blocks: list[Frames] = []
-
-    def frames(self, frames: Frames) -> None:
-        """Take a block of frames."""
-        self._clearance.frames(frames)
-        self._blocks.append(frames)
-
-    def end(self, ending: Ending) -> None:
-        """Nothing is left to do."""
-
-    def result(self) -> dict[str, float | None]:
-        """Return the robustness of rules 1 and 2 by their names, metres; None where nothing could break them.
-
-        It is positive if the rule was kept and negative if it was broken, or would be if the trial ended here.
-        """
-        gap = self._clearance.result()
-        count = sum(map(len, self._blocks))
-        if not count:
-            return margins_by_rule(gap, [math.inf] * len(MEASURED))
-        # compiles; only where there is something to measure
-        from dubins_traffic.scoring.margins_kernel import (
-            EgoFrame,
-            EgoMargins,
-            MarginTables,
-            find_margins,
-            margin_rules,
-        )
-
-        problem = self._problem
-        rules = RuleParameters.from_mapping(problem.rules)
-        found = table(EgoMargins, 1)
-        only = np.zeros(1, dtype=np.int64)
-        tables = MarginTables(
-            rules=margin_rules([rules], [problem.period], only),
-            roads=pack([problem.network], [problem.car.lane_width]),
-            cars=pack_cars([problem.car]),
-            signal=np.zeros(count),
-        )
-        ego = table(EgoFrame, (1, count))
-        for name in ("x", "y", "c", "s", "bits", "lane"):
-            ego[name] = np.concatenate([getattr(block, name)[:, EGO] for block in self._blocks])
-        find_margins(only, np.array([count]), ego, only, tables, found)
-        return margins_by_rule(gap, [found[0].road, found[0].line, found[0].back, found[0].turn])
 
 
 def entries_by_rule(found: EntryMargins, period: float) -> dict[str, float | None]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,20 +19,19 @@ from dubins_traffic.record.sink import BY_CONTROLLER, Ending
 from dubins_traffic.record.wall import Wall
 from dubins_traffic.scoring import registry
 from dubins_traffic.scoring.blocks import joined
-from dubins_traffic.scoring.clean import is_clean
-from dubins_traffic.scoring.clearance import Clearance
-from dubins_traffic.scoring.collisions import Collision, Collisions
-from dubins_traffic.scoring.driving import Driven, Driving
-from dubins_traffic.scoring.duration import early_rounds, ran_whole
+from dubins_traffic.scoring.collisions import Collision, collisions_of
+from dubins_traffic.scoring.driving import Driven, driven_of
+from dubins_traffic.scoring.duration import early_rounds
+from dubins_traffic.scoring.findings import Findings
 from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
-from dubins_traffic.scoring.goals import GoalVisits, Visiting
-from dubins_traffic.scoring.icra2016 import Icra2016
+from dubins_traffic.scoring.goals import GoalVisits
+from dubins_traffic.scoring.icra2016 import icra2016_of
 from dubins_traffic.scoring.interventions import Interventions
 from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.metric import Measured, MetricSpec
 from dubins_traffic.scoring.own_metrics import OwnMetrics
 from dubins_traffic.scoring.paper import paper_score
-from dubins_traffic.scoring.verdict import Ruling, Verdict, first_breach
+from dubins_traffic.scoring.verdict import Ruling, Verdict, is_clean
 
 _BLOCK = 512
 
@@ -150,6 +149,37 @@ class Score(Tabulated):
         return document
 
 
+def score_of(found: Findings, controller: str | None, time_to_begin: float | None) -> Score:
+    """Return the score of a trial, whose ego `controller` drove, as far as its counts and its judge tell it."""
+    instance, counts, ending, rate = found.instance, found.counts, found.ending, found.instance.problem.rate
+    visits, driven = found.visits, driven_of(counts, rate, found.last)
+    collisions, among_others = collisions_of(instance.names, found.contacts)
+    verdict = found.verdict(visits, collisions)
+    early, samples = found.tally.early[found.row], found.tally.samples[found.row]
+    return Score(
+        trial=instance.trial,
+        seed=instance.seed,
+        end=None if ending is None else ending.end.value,
+        controller=None if controller is None else bare_name(controller),
+        record=None,
+        duration_s=max(0, found.last) / rate,
+        rounds=visits.rounds,
+        counted_rounds=visits.rounds if is_clean(verdict, collisions, whole=found.whole) else 0,
+        rounds_before_breach=early_rounds(early, len(visits.goals), ending),
+        goals_visited=visits.visited,
+        goals=visits.goals,
+        collisions=collisions,
+        collisions_among_others=among_others,
+        driven=driven,
+        min_clearance_m=found.gap,
+        time_to_begin_s=time_to_begin,
+        verdict=verdict,
+        formulas=(),
+        paper_score=paper_score(instance, collisions, visits.rounds, driven.off_road_s),
+        icra2016=icra2016_of(instance, counts, samples.rounds, found.last + 1),
+    )
+
+
 class Scorer:
     """A sink that computes all metrics of one trial.
 
@@ -166,30 +196,14 @@ class Scorer:
 
     def __init__(self, metrics: Sequence[MetricSpec] = ()) -> None:
         self._own = OwnMetrics(registry.makers(metrics)) if metrics else None
-        self._icra2016 = Icra2016()
-        self._collisions = Collisions()
-        self._visiting = Visiting()
-        self._driving = Driving()
-        self._clearance = Clearance()
         self._judging = Judging()
         self._formulas = FormulaVerdicts()
         self._interventions = Interventions()
-        self._metrics = (
-            self._icra2016,
-            self._collisions,
-            self._visiting,
-            self._driving,
-            self._clearance,
-            self._judging,
-            self._formulas,
-            self._interventions,
-            *([] if self._own is None else [self._own]),
-        )
+        own = [] if self._own is None else [self._own]
+        self._metrics = (self._judging, self._formulas, self._interventions, *own)
 
     def begin(self, instance: Instance) -> None:
         """Start all metrics."""
-        self._instance = instance
-        self._ending: Ending | None = None
         self._count = 0
         self._shown = 0
         self._waiting: list[Frames] = []
@@ -204,9 +218,8 @@ class Scorer:
             self._show()
 
     def end(self, ending: Ending) -> None:
-        """Keep the ending of the trial."""
+        """End all metrics."""
         self._show()
-        self._ending = ending
         for metric in self._metrics:
             metric.end(ending)
 
@@ -225,32 +238,11 @@ class Scorer:
             Wall-clock figures of the trial.
         """
         self._show()
-        visits, verdict = self._visiting.result(), self._judging.result()
-        collisions, driven = self._collisions.result(), self._driving.result()
-        whole = ran_whole(self._instance, self._ending, self._count - 1)
-        clean = is_clean(verdict, collisions, whole=whole)
-        broken = first_breach(verdict, collisions)
-        return Score(
-            trial=self._instance.trial,
-            seed=self._instance.seed,
-            end=None if self._ending is None else self._ending.end.value,
-            controller=None if controller is None else bare_name(controller),
+        begin = None if wall is None else wall.time_to_begin_s
+        return replace(
+            score_of(self._judging.findings(), controller, begin),
             record=None if record is None else str(record),
-            duration_s=max(0, self._count - 1) / self._instance.problem.rate,
-            rounds=visits.rounds,
-            counted_rounds=visits.rounds if clean else 0,
-            rounds_before_breach=early_rounds(self._visiting.rounds_until(broken), self._ending),
-            goals_visited=visits.visited,
-            goals=visits.goals,
-            collisions=collisions,
-            collisions_among_others=self._collisions.among_others,
-            driven=driven,
-            min_clearance_m=self._clearance.result(),
-            time_to_begin_s=None if wall is None else wall.time_to_begin_s,
-            verdict=verdict,
             formulas=self._formulas.result(),
-            paper_score=paper_score(self._instance, collisions, visits.rounds, driven.off_road_s),
-            icra2016=self._icra2016.result(),
             interventions=self._interventions.result(),
             metrics=() if self._own is None else self._own.result(),
         )

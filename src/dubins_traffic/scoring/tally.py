@@ -1,25 +1,133 @@
-"""The metrics of batched trials, counted tick by tick (compiled); they equal what the sinks find in frames."""
+"""The counts of a trial: one kernel counts a frame, in batches tick by tick, of a single trial block by block.
+
+Live, in a batch and from a record the counts are these; `scoring.findings` turns them into a score.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import chain
 from math import sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from dubins_traffic.cars.near import ticks_within
-from dubins_traffic.cars.state import EGO, State
+from dubins_traffic.cars.near import Spacing, ticks_within
+from dubins_traffic.cars.sensing import within_sight
+from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
+from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.boxes import box_gap
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_look, jit_rare
+from dubins_traffic.kernels.records import Grid, Rows, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.roads.lookup import nearest_vertex
 from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.judged import distinct_problems
+from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.scoring.box_gap import box_gap
+from dubins_traffic.rules.visits import begins_visit, come_by, do_goal, finish_round
+from dubins_traffic.scoring.counts import GoalCounts, RoundCount, TrialCounts
 from dubins_traffic.scoring.icra2016 import COLLISION_DISTANCE, ROAD_HALF_WIDTH
-from dubins_traffic.scoring.tally_tables import Counted, Tally, TrialCounts
+from dubins_traffic.scoring.icra2016 import counts as counts_in_2016
+from dubins_traffic.scoring.margins import EgoFrame, EgoMargins, MarginRules, MarginTables, find_margins
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Instance
 
 ROUNDING = 1e-6
 """A distance that rounding errors never reach, metres."""
 FARTHEST = 100.0
 """Metres beyond which distances are not told apart."""
+
+
+class Tally(Tables):
+    """The counts of each trial, `trial` (B,), and of its goals, `goal` (G,), one trial's after another's, each once.
+
+    Rounds are counted in three ways, (B,), with a 1 for the goals done in the present one, (G,): `samples`, in which
+    a goal is done in each frame inside its disc, as in 2016 (`scoring.icra2016`); `rounds`, in which it is done by a
+    visit; `early`, rounds of the visits after frame 0 and up to the frame of the ego's first breach.
+    `counts` (B, N): 1 for the e-agents that count in the score of 2016; `sensed` (B, N): the last tick at which the car
+    was within the ego's sensing radius, -1 before; `before_x`, `before_y` (B, N): where the cars were in the frame
+    before; `ego` (B, F): the ego in each frame so far.
+    """
+
+    trial: Rows[TrialCounts]
+    goal: Rows[GoalCounts]
+    samples: Rows[RoundCount]
+    sample_done: Ints
+    rounds: Rows[RoundCount]
+    round_done: Ints
+    early: Rows[RoundCount]
+    early_done: Ints
+    counts: Ints
+    sensed: Ints
+    before_x: Floats
+    before_y: Floats
+    ego: Grid[EgoFrame]
+
+
+class Counted(Tables):
+    """All tables that counting takes: the frame, roads, cars and obstacles, and the tally."""
+
+    state: State
+    labels: Labels
+    roads: RoadTable
+    cars: CarTable
+    obstacles: ObstacleTable
+    spacing: Spacing
+    tally: Tally
+
+
+def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
+    """Return the tally of a batch of instances, whose networks have the numbers `nets`, before the first frame."""
+    trials = len(instances)
+    trial = table(TrialCounts, trials)
+    trial["net"] = nets
+    counts = np.zeros((trials, cars), dtype=np.int64)
+    kinds, index = distinct_problems([instance.problem for instance in instances])
+    rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
+    trial["still"] = np.array([own.still_speed / kind.rate for own, kind in zip(rules, kinds, strict=True)])[
+        index
+    ]
+    trial["radius"] = np.array([kind.intersection_radius for kind in kinds])[index]
+    trial["sight2"] = np.array([kind.sensing_radius * kind.sensing_radius for kind in kinds])[index]
+    fleets, whose = distinct([id(instance.e_agents) for instance in instances])
+    for number, b in enumerate(fleets):
+        count: list[bool] = [counts_in_2016(agent.name) for agent in instances[b].e_agents]
+        counts[whose == number, 1 : 1 + len(count)] = count
+    goals = [tuple(dict.fromkeys(instance.problem.goal_vertices)) for instance in instances]
+    last = np.array([len(own) for own in goals]).cumsum()
+    trial["first_goal"][1:] = last[:-1]
+    trial["last_goal"] = last
+    goal = table(GoalCounts, int(last[-1]))
+    goal["vertex"] = list(chain.from_iterable(goals))
+    frames = 1 + max(max(1, instance.ticks) for instance in instances)
+    return Tally(
+        trial=trial,
+        goal=goal,
+        samples=table(RoundCount, trials),
+        sample_done=np.zeros(len(goal), dtype=np.int64),
+        rounds=table(RoundCount, trials),
+        round_done=np.zeros(len(goal), dtype=np.int64),
+        early=table(RoundCount, trials),
+        early_done=np.zeros(len(goal), dtype=np.int64),
+        counts=counts,
+        sensed=np.full((trials, cars), -1, dtype=np.int64),
+        before_x=np.zeros((trials, cars)),
+        before_y=np.zeros((trials, cars)),
+        ego=table(EgoFrame, (trials, frames)),
+    )
+
+
+def tally_margins(
+    trials: Ints, frames: Ints, tally: Tally, rules: Rows[MarginRules], roads: RoadTable, cars: CarTable
+) -> Rows[EgoMargins]:
+    """Return the margins of some trials of a tally, (B,), of which each has so many frames; others' are infinite."""
+    found = table(EgoMargins, len(tally.trial))
+    tables = MarginTables(rules, roads, cars, np.zeros(tally.ego.shape[1]))
+    find_margins(trials, frames, tally.ego, np.ascontiguousarray(tally.trial["net"]), tables, found)
+    return found
 
 
 @jit
@@ -47,7 +155,9 @@ def count_frame(b: int, tick: int, counted: Counted) -> None:
         _look_at_obstacles(b, state, cars, obstacles, own)
     at = labels.at[b, EGO]
     if at >= 0 and at != own.last_at:
-        _freshen(b, at, tally)
+        own.last_at = at
+        for g in range(own.first_goal, own.last_goal):
+            come_by(at, tally.goal[g])
     if not _is_far(tick, own):
         spare = _count_goals(b, tick, x, y, roads, tally)
         spare = min(spare, _count_off_road(b, tick, x, y, labels.segment[b, EGO], roads, tally))
@@ -85,14 +195,13 @@ def _look_at_cars(b: int, tick: int, state: State, cars: CarTable, tally: Tally)
     x, y = state.x[b, EGO], state.y[b, EGO]
     reach = own.clearance + 2.0 * cars.reach[b] + 1e-9
     near2 = max(reach * reach, 2.0 * COLLISION_DISTANCE * COLLISION_DISTANCE)
-    sight2 = own.sight2 if own.sealed == 0 else -1.0
     sensed = tally.sensed[b]
     near = 0
     for n in range(1, state.count[b]):
         dx = state.x[b, n] - x
         dy = state.y[b, n] - y
         d2 = dx * dx + dy * dy
-        if d2 <= sight2:
+        if own.sealed == 0 and within_sight(dx, dy, own.sight2):
             sensed[n] = tick
         if d2 <= near2:
             near = 1
@@ -139,16 +248,6 @@ def _look_at_obstacles(
 
 
 @jit_inline
-def _freshen(b: int, at: int, tally: Tally) -> None:
-    """Note that the ego is in the disc of `at`: coming into that of any other goal is then a visit."""
-    own = tally.trial[b]
-    own.last_at = at
-    for g in range(own.first_goal, own.last_goal):
-        if tally.goal[g].vertex != at:
-            tally.goal[g].fresh = 1
-
-
-@jit_inline
 def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally: Tally) -> float:
     """Count samples inside the goals' discs, visits, and rounds of both.
 
@@ -165,51 +264,30 @@ def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally:
         dy = y - roads.vertex[offset + goal.vertex].y
         away = sqrt(dx * dx + dy * dy)
         spare = min(spare, max(away - radius, 0.0))
-        inside = 1 if away < radius else 0
-        if inside > 0:
+        if away < radius:
             some = True
-            goal.sample_done = 1
-            if goal.inside == 0 and goal.fresh != 0:
-                goal.fresh = 0
-                own.last_at = -1
-                goal.visit_done = 1
-                goal.visits += 1
-                goal.gap = max(goal.gap, tick - goal.last_visit)
-                goal.last_visit = tick
-                if tick > 0 and own.sealed == 0:
-                    _count_early_visit(g, own, tally)
-        goal.inside = inside
+            do_goal(g, tally.sample_done, tally.samples[b])
+        if begins_visit(away < radius, goal):
+            _count_visit(b, g, tick, tally)
     if some:
-        _count_rounds(own, tally)
+        finish_round(own.first_goal, own.last_goal, tally.sample_done, tally.samples[b])
+        finish_round(own.first_goal, own.last_goal, tally.round_done, tally.rounds[b])
+        finish_round(own.first_goal, own.last_goal, tally.early_done, tally.early[b])
     return spare
 
 
 @jit_rare
-def _count_early_visit(g: int, own: TrialCounts, tally: Tally) -> None:
-    """Count a visit of goal `g` (row) for the rounds before the first breach (docs/rules.md#before-breach)."""
-    own.early_goals += 1 - tally.goal[g].early_done
-    tally.goal[g].early_done = 1
-    if own.early_goals == own.last_goal - own.first_goal:
-        own.early_rounds += 1
-        own.early_goals = 0
-        for k in range(own.first_goal, own.last_goal):
-            tally.goal[k].early_done = 0
-
-
-@jit_inline
-def _count_rounds(own: TrialCounts, tally: Tally) -> None:
-    """Count a round of samples, and one of visits, if all goals are done; all goals then become undone."""
-    sampled, visited = 1, 1
-    for g in range(own.first_goal, own.last_goal):
-        sampled &= tally.goal[g].sample_done
-        visited &= tally.goal[g].visit_done
-    own.sampled += sampled
-    own.rounds += visited
-    if sampled + visited > 0:
-        for g in range(own.first_goal, own.last_goal):
-            goal = tally.goal[g]
-            goal.sample_done = 0 if sampled == 1 else goal.sample_done
-            goal.visit_done = 0 if visited == 1 else goal.visit_done
+def _count_visit(b: int, g: int, tick: int, tally: Tally) -> None:
+    """Count a visit of goal `g` (row)."""
+    goal = tally.goal[g]
+    tally.trial[b].last_at = -1
+    goal.visits += 1
+    goal.at_start = 1 if tick == 0 else goal.at_start
+    goal.gap = max(goal.gap, tick - goal.last_visit)
+    goal.last_visit = tick
+    do_goal(g, tally.round_done, tally.rounds[b])
+    if tick > 0 and tally.trial[b].sealed == 0:
+        do_goal(g, tally.early_done, tally.early[b])
 
 
 @jit_inline
@@ -242,3 +320,36 @@ def _inside(k: int, x: float, y: float, roads: RoadTable) -> float:
     along = rx * roads.segment[k].tx + ry * roads.segment[k].ty
     beside = rx * roads.segment[k].ty - ry * roads.segment[k].tx
     return min(along, roads.segment[k].length - along, ROAD_HALF_WIDTH - abs(beside))
+
+
+@jit
+def count_frames(
+    first: int, seal: int, poses: State, labels: Labels, begun: Ints, seen: Ints, counted: Counted
+) -> None:
+    """Count frames of the only trial; row f of `poses` and `labels` (F, N) is frame `first` (tick) + f.
+
+    Visits are counted by poses, as all that is judged; flags, lane states and nearest segments are those of `labels`.
+    The trial is sealed after frame `seal` (tick). `begun` (F, G) gets 1 for each goal of which a visit begins,
+    `seen` (F, N) for each car that the ego senses.
+    """
+    state, ego, own = counted.state, counted.labels, counted.tally.trial[0]
+    segments = counted.roads.seg_off[1]
+    for f in range(poses.x.shape[0]):
+        for n in range(poses.x.shape[1]):
+            state.x[0, n] = poses.x[f, n]
+            state.y[0, n] = poses.y[f, n]
+            state.c[0, n] = poses.c[f, n]
+            state.s[0, n] = poses.s[f, n]
+            dx, dy = poses.x[f, n] - poses.x[f, EGO], poses.y[f, n] - poses.y[f, EGO]
+            seen[f, n] = 1 if within_sight(dx, dy, own.sight2) else 0
+        ego.segment[0, EGO] = min(max(labels.segment[f, EGO], 0), segments - 1)  # a record may name others
+        v, away2 = nearest_vertex(counted.roads, 0, poses.x[f, EGO], poses.y[f, EGO])
+        ego.at[0, EGO] = v if away2 < own.radius * own.radius else -1
+        ego.lane[0, EGO] = labels.lane[f, EGO]
+        ego.bits[0, EGO] = labels.bits[f, EGO]
+        if first + f > seal:
+            own.sealed = 1
+        count_frame(0, first + f, counted)
+        for g in range(begun.shape[1]):
+            goal = counted.tally.goal[g]
+            begun[f, g] = 1 if goal.visits != 0 and goal.last_visit == first + f else 0

@@ -5,20 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from itertools import groupby
 from typing import TYPE_CHECKING, Any, Final
 
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.rules import breach_log
 from dubins_traffic.rules.clauses import clause
 from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.parameters import EDITION, RuleParameters
 from dubins_traffic.rules.tables import ticks
 from dubins_traffic.scoring.collisions import Collision
+from dubins_traffic.scoring.duration import planned_ticks
 from dubins_traffic.scoring.formulas import Status
-from dubins_traffic.scoring.gap_limit import gap_limit
 from dubins_traffic.scoring.goals import Visits
-from dubins_traffic.scoring.nearness import is_near
 
 if TYPE_CHECKING:
     from dubins_traffic.rules.referee import Breach, Pending
@@ -211,7 +212,7 @@ def reach_verdict(
     margins: dict[str, float | None],
     *,
     whole: bool,
-    by_controller: bool,
+    end: str | None,
 ) -> Verdict:
     """Return the verdict on a trial.
 
@@ -238,8 +239,8 @@ def reach_verdict(
         The margins of the ego, by rule.
     whole
         Whether the trial ran its whole planned duration.
-    by_controller
-        Whether the ego's controller ended the trial: then it is not cut.
+    end
+        How the trial ended; None while it runs, and for a record that was cut off.
     """
     rate = instance.problem.rate
     violations = tuple([_violation(instance, breach) for breach in breaches])
@@ -261,8 +262,8 @@ def reach_verdict(
         near = is_near(breaches, back, seen)
     return Verdict(
         ruling,
-        not own and whole,
-        not own and not whole and not by_controller,
+        clean := not own and whole,
+        was_cut(ruling, clean, end),
         excuse,
         near,
         violations,
@@ -332,13 +333,6 @@ def assumed(rules: RuleParameters) -> tuple[str, ...]:
     return tuple([name for name, switch in _SWITCHES if getattr(rules, switch)])
 
 
-def first_breach(verdict: Verdict | None, collisions: Sequence[Collision]) -> int | None:
-    """Return the frame of the ego's first breach, without a verdict of its first collision; None if there is none."""
-    if verdict is None:
-        return collisions[0].tick if collisions else None
-    return min((found.tick for found in verdict.own_violations), default=None)
-
-
 def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -> tuple[str, Breach] | None:
     """Return the part of the assumption that is broken first, with its breach; None if the assumption holds.
 
@@ -354,3 +348,61 @@ def first_fall(breaches: Sequence[Breach], rules: RuleParameters, rate: float) -
             continue
         return part, breach
     return None
+
+
+def is_clean(verdict: Verdict | None, collisions: Sequence[Collision], *, whole: bool) -> bool:
+    """Tell whether a trial is clean; if it is not judged, whether it ran `whole` and the ego touched nothing.
+
+    Norm: docs/rules.md#clean.
+    """
+    return whole and not collisions if verdict is None else verdict.clean
+
+
+def was_cut(verdict: str | None, clean: bool | None, end: str | None) -> bool:
+    """Tell whether others or the user ended a judged trial before the ego broke anything.
+
+    It is left out of shares of clean trials. Norm: docs/rules.md#cut.
+    """
+    return verdict == Ruling.UNFINISHED and not clean and end not in BY_CONTROLLER
+
+
+def told_cut(count: int) -> str:
+    """Return what is said beside a share of clean trials of the `count` trials that were cut."""
+    return f", {count} cut" if count else ""
+
+
+def is_near(breaches: Sequence[Breach], back: int, seen: Callable[[int, int], bool]) -> bool:
+    """Tell whether each breach of the ego follows one of an e-agent that was near it.
+
+    Norm: docs/rules.md#near.
+
+    Parameters
+    ----------
+    breaches
+        All breaches of a trial, in order of time.
+    back
+        Most ticks from the e-agent's breach to the ego's; the same frame counts.
+    seen
+        Called with (car, tick) of a breach by an e-agent; tells whether the car was within the sensing radius then.
+    """
+    last: int | None = None
+    for tick, group in groupby(breaches, key=lambda breach: breach.tick):
+        cars = {breach.car for breach in group}
+        if any(car != EGO and seen(car, tick) for car in cars):
+            last = tick
+        if EGO in cars and (last is None or last < tick - back):
+            return False
+    return True
+
+
+def gap_limit(instance: Instance, rules: RuleParameters) -> float:
+    """Return the longest gap between visits of a goal that `satisfied` allows, seconds (docs/rules.md#satisfied)."""
+    planned = planned_ticks(instance) / instance.problem.rate
+    return min(rounds_limit(instance.problem, rules), rules.gap_share * planned)
+
+
+def rounds_limit(problem: Problem, rules: RuleParameters) -> float:
+    """Return the part of `gap_limit` that does not depend on the duration, seconds; inf if there is no round."""
+    from dubins_traffic.routing.rounds import round_time  # compiles; only where there is something to judge
+
+    return rules.gap_rounds * round_time(problem)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dubins_traffic.cars.sensing import within_sight
 from dubins_traffic.cars.state import EGO, Command, Pose, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.kernels.trig import advance
@@ -18,7 +19,7 @@ from dubins_traffic.roads.lookup import (
 )
 from dubins_traffic.rules.lane_state import along_lane, lane_here
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.rules.shape import distance2_to_body, half_extent
+from dubins_traffic.rules.shape import distance2_to_body, half_across, half_extent
 from dubins_traffic.shield.tables import REASON, ShieldTables
 
 VERGE = 0.005
@@ -46,12 +47,11 @@ def gather_close(b: int, state: State, sight2: float, vehicle: Vehicle, scratch:
     `sight2` (m2) is the square of how far the ego sees, negative if everywhere.
     """
     far = 2.0 * (vehicle.reach + 1.2 * travel_of(vehicle)) + GUARD
-    far2 = min(far * far, sight2) if sight2 >= 0.0 else far * far
     count = 0
     for n in range(1, state.count[b]):
         dx = state.x[b, n] - state.x[b, EGO]
         dy = state.y[b, n] - state.y[b, EGO]
-        if dx * dx + dy * dy <= far2:
+        if dx * dx + dy * dy <= far * far and within_sight(dx, dy, sight2):
             scratch.near[count] = n
             count += 1
     return count
@@ -167,7 +167,7 @@ def _leaves_lane(
         if progress < before:
             return REASON.TURN
     tx, ty = lane_direction_at(roads, net, after, pose.x, pose.y)
-    half = half_extent(tx, ty, pose.c, pose.s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
+    half = half_extent(tx, ty, pose.c, pose.s, vehicle)
     reach = lateral + half
     if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:
         return REASON.RETURN if reach >= shields.ego[b].left_release else REASON.NOTHING
@@ -186,6 +186,4 @@ def _reach(b: int, lane: int, traffic: Traffic, net: int, vehicle: Vehicle) -> f
         return 0.0
     tx, ty = lane_direction_at(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
     _, lateral = lane_coordinates(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
-    return lateral + half_extent(
-        tx, ty, state.c[b, EGO], state.s[b, EGO], vehicle.half_length, vehicle.half_width, vehicle.rounding
-    )
+    return lateral + half_across(b, EGO, tx, ty, state, vehicle)

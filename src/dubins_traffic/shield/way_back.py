@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from dubins_traffic.cars.sensing import within_sight
 from dubins_traffic.cars.state import EGO, Command, Pose, State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
@@ -100,7 +101,7 @@ def surely_returns(
         if _leaves(lane, pose, roads, net, vehicle) or _may_come(b, k, pose, sight2, state, shields, vehicle):
             return False
         tx, ty = lane_direction_at(roads, net, lane, x, y)
-        half = half_extent(tx, ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
+        half = half_extent(tx, ty, c, s, vehicle)
         if lateral + half < shields.ego[b].left_release:
             return True
         before = progress
@@ -159,7 +160,7 @@ def _may_come(
     unseen = shields.ego[b].cars - 1
     for n in range(1, state.count[b]):
         ox, oy = state.x[b, n], state.y[b, n]
-        if sight2 >= 0.0 and (ox - ex) * (ox - ex) + (oy - ey) * (oy - ey) > sight2:
+        if not within_sight(ox - ex, oy - ey, sight2):
             continue
         unseen -= 1
         if (ox - x) * (ox - x) + (oy - y) * (oy - y) <= far * far:

@@ -15,9 +15,8 @@ from dubins_traffic.campaign.report.write import csv_files
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, require_output, write_text
 from dubins_traffic.record.sink import BY_CONTROLLER, FAULTS
-from dubins_traffic.scoring.clean import told_cut, was_cut
 from dubins_traffic.scoring.columns import SCORES, SECOND
-from dubins_traffic.scoring.verdict import Ruling
+from dubins_traffic.scoring.verdict import Ruling, told_cut, was_cut
 from dubins_traffic.suites.comparing import (
     Source,
     check_suite,

@@ -70,8 +70,8 @@ class Trial:
         for agent in self._agents:
             agent.reset([instance], self._state)
         self._senses = Senses(instance, scanner=simulator if isinstance(simulator, Scans) else None)
-        self._buffer = FrameBuffer(instance, sinks)
-        self._buffer.push(self._state, self._labels, self._commands, (), ())
+        self._buffer = FrameBuffer([instance], [sinks])
+        self._buffer.push(self._state, self._labels, self._commands)
         self._tick = 0
         self._all_finite = bound(all_finite)
         self._tellers = [agent for agent in self._agents if isinstance(agent, Reports)]
@@ -98,7 +98,7 @@ class Trial:
         They have been handed all frames up to the present one, unless one of them can't go on in a fork: the writer
         of a record gets whole seconds.
         """
-        return self._buffer.sinks
+        return self._buffer.sinks()
 
     @property
     def observation(self) -> Observation:
@@ -142,7 +142,9 @@ class Trial:
             self._tick += 1
             self._observation = None
             contacts = self._labeller.update(self._tick, self._state, contacts)[0]
-            self._buffer.push(self._state, self._labels, commands, contacts, ())
+            if contacts:
+                self._buffer.touch(contacts)
+            self._buffer.push(self._state, self._labels, commands)
         if self._tick >= self._ticks:
             self.end(End.DURATION)
         elif contacts and self.instance.end_on_collision:

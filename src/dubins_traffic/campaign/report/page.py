@@ -9,9 +9,8 @@ from dubins_traffic.campaign.report import plots
 from dubins_traffic.campaign.report.comparison import Comparison, shown, words
 from dubins_traffic.campaign.report.worst import Bad
 from dubins_traffic.rules.clauses import clause
-from dubins_traffic.scoring.clean import told_cut
 from dubins_traffic.scoring.notice import assumption_notice
-from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, told_cut
 from dubins_traffic.viewer.pages import render
 
 MINUS = "\N{MINUS SIGN}"

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import sqrt
 
+from dubins_traffic.cars.sensing import within_sight
 from dubins_traffic.cars.state import EGO, Command, Pose, State
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.policies.lanes.gaps import (
@@ -54,7 +55,7 @@ def decide_in(b: int, tick: int, radius: float, state: State, known: Knowledge, 
     for n in range(1, state.count[b]):
         dx = state.x[b, n] - x
         dy = state.y[b, n] - y
-        if dx * dx + dy * dy <= radius * radius:
+        if within_sight(dx, dy, radius * radius):
             car = known.other[n - 1]
             car.tick, car.x, car.y, car.c, car.s = (
                 tick,

@@ -13,7 +13,7 @@ from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath, on_way
 from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import lane_end, lane_start
-from dubins_traffic.rules.shape import half_extent
+from dubins_traffic.rules.shape import half_across
 
 
 @jit_inline
@@ -63,15 +63,7 @@ def away_from(b: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
     for k in range(near):
         j = scratch.near[k]
         _, _, left, px, py = on_way(way, state.x[b, j], state.y[b, j])
-        half = half_extent(
-            px,
-            py,
-            float(state.c[b, j]),
-            float(state.s[b, j]),
-            vehicle.half_length,
-            vehicle.half_width,
-            vehicle.rounding,
-        )
+        half = half_across(b, j, px, py, state, vehicle)
         if 0.0 < left < 4.0 * vehicle.middle:
             offset = min(offset, left - half - clear)
     return max(offset, EDGE - vehicle.middle)

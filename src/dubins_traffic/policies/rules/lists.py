@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Final, NamedTuple
 
+from dubins_traffic.cars.sensing import within_sight
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.policies.rules.tables import Traffic
 
@@ -46,7 +47,7 @@ def list_cars(b: int, sight2: float, traffic: Traffic) -> int:
     for n in range(state.count[b]):
         dx = state.x[b, n] - state.x[b, 0]
         dy = state.y[b, n] - state.y[b, 0]
-        if sight2 >= 0.0 and dx * dx + dy * dy > sight2:
+        if not within_sight(dx, dy, sight2):
             hidden += 1
             continue
         scratch.link[n] = scratch.head[labels.segment[b, n]]

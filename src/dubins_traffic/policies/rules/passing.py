@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any
 
-from dubins_traffic.cars.state import EGO, State
+from dubins_traffic.cars.state import EGO
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.abilities import turns_within_road
@@ -14,7 +13,7 @@ from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.rules.shape import half_extent
+from dubins_traffic.rules.shape import half_across
 
 PASSING_WAIT = 2.0
 """Seconds to wait behind what stands before passing it."""
@@ -55,15 +54,6 @@ def stop_line(vehicle: Vehicle) -> float:
     """Return where along the lane, metres from the intersection, negative, a car has to be back in it."""
     edge = vehicle.disc + vehicle.reach + 0.03
     return -sqrt(edge * edge - vehicle.middle * vehicle.middle)
-
-
-@jit
-def half_width(b: int, j: Any, way: ReferencePath, state: State, vehicle: Vehicle) -> float:
-    """Return half the extent of car `j` (index) across the lane, metres."""
-    return half_extent(
-        way.tx, way.ty, float(state.c[b, j]), float(state.s[b, j]),
-        vehicle.half_length, vehicle.half_width, vehicle.rounding,
-    )  # fmt: skip
 
 
 @jit
@@ -149,7 +139,12 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
         passes = labels.bits[b, j] & FLAG.LEFT != 0 and not stands
         if j != n and key > own - (OVERTAKEN if passes else 0.5):
             before = key > own or left > vehicle.middle
-            wide = half_width(b, j, way, state, vehicle) + vehicle.half_width + vehicle.rounding + 0.1
+            wide = (
+                half_across(b, j, way.tx, way.ty, state, vehicle)
+                + vehicle.half_width
+                + vehicle.rounding
+                + 0.1
+            )
             if before and abs(left - offset) < wide and key < back + (0.5 if stands else comes):
                 return
             if not stands and left < vehicle.middle:
@@ -259,7 +254,7 @@ def extent(
                 and left < vehicle.middle
             ):
                 end = max(end, key)
-                offset = max(offset, left + half_width(b, j, way, state, vehicle))
+                offset = max(offset, left + half_across(b, j, way.tx, way.ty, state, vehicle))
                 low = -INFINITE
             j = scratch.link[j]
         for p in range(obstacles.off[b], obstacles.off[b + 1]):

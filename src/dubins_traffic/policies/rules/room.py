@@ -14,7 +14,7 @@ from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
 from dubins_traffic.rules.blocking import narrows
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.rules.shape import half_extent
+from dubins_traffic.rules.shape import half_across
 
 MARGIN = 0.02
 """Distance that a car keeps from a disc that it may not enter, metres."""
@@ -158,15 +158,7 @@ def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
     j = scratch.head[out >> 1]
     while j >= 0:
         along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
-        half = half_extent(
-            tx,
-            ty,
-            float(state.c[b, j]),
-            float(state.s[b, j]),
-            vehicle.half_length,
-            vehicle.half_width,
-            vehicle.rounding,
-        )
+        half = half_across(b, j, tx, ty, state, vehicle)
         takes = aside <= 0.0 and traffic.labels.lane[b, j] != out ^ 1
         takes = takes or narrows(aside - half, aside + half, 2.0 * vehicle.middle, vehicle.needed)
         if j != n and takes and along <= vehicle.disc + vehicle.exit_room:

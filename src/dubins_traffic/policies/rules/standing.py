@@ -5,12 +5,12 @@ from __future__ import annotations
 from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.kernels.trig import advance
-from dubins_traffic.policies.rules.passing import along, aside, half_width
+from dubins_traffic.policies.rules.passing import along, aside
 from dubins_traffic.policies.rules.tables import Driver, Scratch, Traffic
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.rules.blocking import narrows
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.rules.shape import half_extent
+from dubins_traffic.rules.shape import half_across, half_extent
 
 LINE, SURE = 0.002, 0.03
 """Distance of the body from where it counts as left, and of what it passes from where that ends, metres."""
@@ -24,7 +24,7 @@ def stays_right(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePat
     x, y, c, s = advance(
         state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, vehicle.period
     )
-    half = half_extent(way.tx, way.ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
+    half = half_extent(way.tx, way.ty, c, s, vehicle)
     if aside(way, x, y) + half <= vehicle.middle + vehicle.over - LINE:
         return True
     if labels.bits[b, n] & FLAG.OVERTAKING == 0:
@@ -62,7 +62,7 @@ def surely_stands(b: int, n: int, own: float, way: ReferencePath, traffic: Traff
         if j != n and bits & FLAG.STANDS != 0 and watched:
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
             left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - vehicle.middle
-            half = half_width(b, j, way, state, vehicle)
+            half = half_across(b, j, way.tx, way.ty, state, vehicle)
             if own - vehicle.behind + SURE < key < own + vehicle.fore - SURE:
                 found = found or narrows(left - half, left + half, 2.0 * vehicle.middle, vehicle.needed)
         j = scratch.link[j]

@@ -36,7 +36,7 @@ from dubins_traffic.roads.lookup import (
 from dubins_traffic.roads.table import Piece, Segment
 from dubins_traffic.rules.blocking import narrows
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.rules.shape import half_extent
+from dubins_traffic.rules.shape import half_across, half_extent
 
 BESIDE = 0.3
 """Obstacles this near to the road's edge are unrolled with it, metres."""
@@ -205,7 +205,7 @@ def keeps_right(b: int, n: int, pose: Pose, command: Command, watched: int, traf
     x, y, c, s = advance(pose.x, pose.y, pose.c, pose.s, command.speed, command.yaw_rate, vehicle.period)
     own, left = lane_coordinates(roads, net, lane, x, y)
     tx, ty = lane_direction_at(roads, net, lane, x, y)
-    half = half_extent(tx, ty, c, s, vehicle.half_length, vehicle.half_width, vehicle.rounding)
+    half = half_extent(tx, ty, c, s, vehicle)
     if left + half <= vehicle.over - LINE:
         return True
     if bits & FLAG.OVERTAKING == 0:
@@ -230,15 +230,7 @@ def keeps_right(b: int, n: int, pose: Pose, command: Command, watched: int, traf
     x, y = state.x[b, watched], state.y[b, watched]
     key, its = lane_coordinates(roads, net, lane, x, y)
     tx, ty = lane_direction_at(roads, net, lane, x, y)
-    half = half_extent(
-        tx,
-        ty,
-        state.c[b, watched],
-        state.s[b, watched],
-        vehicle.half_length,
-        vehicle.half_width,
-        vehicle.rounding,
-    )
+    half = half_across(b, watched, tx, ty, state, vehicle)
     there = own - vehicle.behind + SURE < key < own + vehicle.fore - SURE
     return there and narrows(its - half, its + half, 2.0 * vehicle.middle, vehicle.needed)
 

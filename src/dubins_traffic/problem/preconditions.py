@@ -1,4 +1,4 @@
-"""Preconditions for rules 2 and 3 to be defined on a problem (docs/rules.md#room)."""
+"""Preconditions of problems: for rules 2 and 3 to be defined (docs/rules.md#room), and for segments that bend."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 from dubins_traffic.cars.body import Car
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.faults import more_faults
-from dubins_traffic.roads.clearance import clearance_faults
+from dubins_traffic.roads.clearance import SEGMENT_SLACK, clearance_faults
 from dubins_traffic.roads.network import RoadNetwork
 
 SLACK = 1e-9
@@ -61,3 +61,21 @@ def check_demands(
             expected=f"{first.expected}, or rules: false (docs/rules.md#room)",
         )
         raise error.within(field=None if first.field == "intersection_radius" else "rnd")
+
+
+def check_curves(
+    network: RoadNetwork,
+    radius: float,
+    car: Car,
+    rules: Mapping[str, Any],
+) -> None:
+    """Refuse a network with a curve that is too tight, or too near to other roads.
+
+    Raises
+    ------
+    InputError
+        Naming the segment and corner, or the setting.
+    """
+    slack = float(rules.get("segment_slack", SEGMENT_SLACK))
+    for fault in clearance_faults(network, radius, car.body.reach, car.w, slack):
+        raise fault.within(field=None if fault.field == "intersection_radius" else "rnd")
