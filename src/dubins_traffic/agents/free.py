@@ -157,7 +157,7 @@ def decide_free(
     """
     state, labels = judging.state, judging.labels
     for n in range(EGO + 1, state.count[b]):
-        f = free.row[b, n]
+        f = int(free.row[b, n])
         if f < 0:
             continue
         speed, yaw_rate = _wanted(b, n, f, tick, commands[b, n, 0], commands[b, n, 1], drivers, judging, free)
@@ -389,7 +389,7 @@ def _describe(instance: Instance, agent: EAgent, car: FreeCar, whims: list[tuple
     car.crowded = math.floor(CROWD * rules.goal_time * rate)
     longest_turn = rules.enter_time if rules.tickets > 0 else min(rules.enter_time, rules.forfeit_time)
     car.wait = math.floor(WAIT * longest_turn * rate)
-    rows = given["whims"] or [
+    rows: Sequence[Sequence[float]] = given["whims"] or [
         (seconds, NOTHING_GIVEN, speed, yaw_rate, NOTHING_GIVEN)
         for seconds, speed, yaw_rate in given["commands"]
     ]

@@ -68,7 +68,7 @@ def started(genome: Genome, base: Instance, starts: list[Pose], moved: Mapping[i
         for n, pose in enumerate(starts):
             if n != car and hypot(pose.x - own.x, pose.y - own.y) < apart:
                 return genome
-    return Genome(genome.base, genome.root, {**genome.starts, **moved}, genome.tables)
+    return Genome(genome.base, genome.root, {**genome.starts, **moved}, genome.tables, genome.whims)
 
 
 def span_of(base: Instance, pose: Pose) -> tuple[float, float] | None:
