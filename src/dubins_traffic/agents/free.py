@@ -25,6 +25,7 @@ from dubins_traffic.kernels.random import DRAW, uniform
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.observations.viewpoints import show
+from dubins_traffic.policies.rules.right_of_way import GOES_NOW
 from dubins_traffic.policies.rules.tables import KIND, Driver, Drivers, Traffic, scratch
 from dubins_traffic.problem.kinds import FREE, parameters_of
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at, lane_start
@@ -59,7 +60,6 @@ ASKEW, ALONG = 0.1, 0.99
 moves as it likes: it needs room to turn, which who stands behind it at a line would not leave."""
 SHORT, LONG = 0.2, 5.0
 """Seconds for which a whim lasts."""
-FIRST: Final = FLAG.STOPPED | FLAG.FIRST | FLAG.CLEAR
 AS_THE_LAW: Final = 1.0
 NOTHING_GIVEN: Final = -1.0
 
@@ -160,40 +160,32 @@ def decide_free(
         f = int(free.row[b, n])
         if f < 0:
             continue
-        speed, yaw_rate = _wanted(b, n, f, tick, commands[b, n, 0], commands[b, n, 1], drivers, judging, free)
+        _like(b, n, tick, commands, drivers, judging, free)
         show(b, n, f, state, labels, free.traffic.state, free.traffic.labels)
-        free.commands[f, EGO, 0], free.commands[f, EGO, 1] = speed, yaw_rate
+        free.commands[f, EGO, 0], free.commands[f, EGO, 1] = commands[b, n, 0], commands[b, n, 1]
         sight2 = float(free.shields.ego[f].sight2)
         shield_trial(f, tick, sight2, free.traffic, free.shields, free.commands)
         commands[b, n, 0], commands[b, n, 1] = free.commands[f, EGO, 0], free.commands[f, EGO, 1]
 
 
 @jit
-def _wanted(
-    b: int,
-    n: int,
-    f: int,
-    tick: int,
-    speed: float,
-    yaw_rate: float,
-    drivers: Drivers,
-    judging: RefereeTables,
-    free: Free,
-) -> tuple[float, float]:
-    """Return what a car does of what it likes; the law says `speed` (m/s) and `yaw_rate` (rad/s)."""
-    own = free.car[f]
+def _like(
+    b: int, n: int, tick: int, commands: Floats, drivers: Drivers, judging: RefereeTables, free: Free
+) -> None:
+    """Replace the command of car n, which is the law's, by what it likes to do, as far as its clocks allow that."""
+    own = free.car[int(free.row[b, n])]
     if own.first < own.last:
         _play(tick, own, free.whim)
     elif tick >= own.until:
         _think(b, n, tick, own, drivers)
     owes = _owes(b, n, tick, own, judging)
     if _holds(b, n, tick, own, drivers, judging):
-        return 0.0, 0.0
-    if owes:
-        return speed, yaw_rate
-    if own.share >= 0.0:
-        return own.share * speed, own.share * yaw_rate
-    return (own.speed, own.yaw_rate) if _may(b, n, own, judging) else (speed, yaw_rate)
+        commands[b, n, 0] = commands[b, n, 1] = 0.0
+    elif not owes and own.share >= 0.0:
+        commands[b, n, 0] *= own.share
+        commands[b, n, 1] *= own.share
+    elif not owes and _may(b, n, own, judging):
+        commands[b, n, 0], commands[b, n, 1] = own.speed, own.yaw_rate
 
 
 @jit
@@ -316,7 +308,7 @@ def _holds(b: int, n: int, tick: int, own: FreeCar, drivers: Drivers, judging: R
     if own.hold < 0:
         own.hold = int(own.wait * _patience(b, n, tick, own, drivers))
     since = judging.log.car[b, n].first_since
-    if bits & FIRST != FIRST or bits & FLAG.FORFEITED != 0 or since < 0:
+    if bits & GOES_NOW != GOES_NOW or bits & FLAG.FORFEITED != 0 or since < 0:
         return False
     return tick - since < own.hold
 

@@ -40,31 +40,20 @@ def turn_round(trials: Ints, views: ViewTables) -> None:
 @jit
 def show(b: int, n: int, row: int, state: State, labels: Labels, own: State, named: Labels) -> None:
     """Fill row `row` (row) of `own` and `named` with the cars of trial b, car n first."""
-    count = state.count[b]
-    own.count[row] = count
-    _put(b, n, row, 0, state, labels, own, named)
-    for j in range(n):
-        _put(b, j, row, j + 1, state, labels, own, named)
-    for j in range(n + 1, count):
-        _put(b, j, row, j, state, labels, own, named)
-
-
-@jit
-def _put(
-    b: int, car: int, row: int, place: int, state: State, labels: Labels, own: State, named: Labels
-) -> None:
-    """Copy a car of a trial into a place of a row."""
-    own.x[row, place] = state.x[b, car]
-    own.y[row, place] = state.y[b, car]
-    own.c[row, place] = state.c[b, car]
-    own.s[row, place] = state.s[b, car]
-    own.speed[row, place] = state.speed[b, car]
-    own.yaw_rate[row, place] = state.yaw_rate[b, car]
-    named.segment[row, place] = labels.segment[b, car]
-    named.at[row, place] = labels.at[b, car]
-    named.crosses[row, place] = labels.crosses[b, car]
-    named.lane[row, place] = labels.lane[b, car]
-    named.bits[row, place] = labels.bits[b, car]
+    own.count[row] = state.count[b]
+    for car in range(state.count[b]):
+        place = 0 if car == n else (car + 1 if car < n else car)
+        own.x[row, place] = state.x[b, car]
+        own.y[row, place] = state.y[b, car]
+        own.c[row, place] = state.c[b, car]
+        own.s[row, place] = state.s[b, car]
+        own.speed[row, place] = state.speed[b, car]
+        own.yaw_rate[row, place] = state.yaw_rate[b, car]
+        named.segment[row, place] = labels.segment[b, car]
+        named.at[row, place] = labels.at[b, car]
+        named.crosses[row, place] = labels.crosses[b, car]
+        named.lane[row, place] = labels.lane[b, car]
+        named.bits[row, place] = labels.bits[b, car]
 
 
 class Viewpoints:
