@@ -28,6 +28,7 @@ KINDS: tuple[Mapping[str, Any], ...] = (
     {"type": "follow", "name": "tail", "count": 2},
     {"type": "parked", "name": "parked", "parameters": {"vacates_after": 1.0}},
     {"type": "scripted", "name": "script", "parameters": {"commands": [[1.0, 0.3, 0.4]], "repeat": True}},
+    {"type": "free", "name": "free", "count": 2},
 )
 """E-agents of every kind that drives beside others."""
 WORLDS: Mapping[str, Mapping[str, Any]] = {

@@ -70,6 +70,26 @@ def test_who_blocks_the_ego_is_named_in_time_and_found_where_e5_allows_too_much(
     assert small.story.rule == BLOCKED
 
 
+def test_what_free_cars_like_to_do_is_searched_and_shrunk(tmp_path: Path) -> None:
+    free = [{"type": "free", "name": "a", "count": 2}]
+    rules = {"gap_rounds": 4.0, "rest_time": 1000.0}
+    own = roads(ELBOW, free, 200.0, rules=rules)
+    found = falsify(own, "rules", tmp_path / "a", rules=[BLOCKED], trials=TRIALS, seed=1, duration=None)
+    assert found.violated
+    case = next(iter(found.cases.values()))
+    assert all(agent.parameters["whims"] for agent in case.instance.e_agents)
+    again = falsify(own, "rules", tmp_path / "b", rules=[BLOCKED], trials=32, seed=1, duration=None)
+    resumed = falsify(
+        own, "rules", tmp_path / "b", rules=[BLOCKED], trials=TRIALS, seed=1, duration=None, resume=True
+    )
+    assert again.trials == 32
+    assert resumed.cases.keys() == found.cases.keys()
+    assert resumed.violated == found.violated
+    small = shrink(case)
+    whole = sum(len(agent.parameters["whims"]) for agent in case.instance.e_agents)
+    assert sum(len(agent.parameters["whims"]) for agent in small.instance.e_agents) < whole
+
+
 def test_no_time_counts_after_somebody_broke_a_rule(tmp_path: Path) -> None:
     assert blocked(tmp_path / "a").discarded == TRIALS
 

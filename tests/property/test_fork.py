@@ -299,13 +299,19 @@ def test_forks_of_some_trials_of_a_batch_equal_the_trials(
 
 
 def shared(one: Group, other: Group) -> list[str]:
-    """Return the names of the arrays that change and that two groups share."""
-    constant = ("stage", "distance", "cycle", "script", "mask")
+    """Return the names of the arrays that change and that two groups share.
+
+    What the shields of free cars know of roads and obstacles changes as little as that of the group.
+    """
+    constant = ("stage", "distance", "cycle", "script", "mask", "whim")
+    ground = (".traffic.roads.", ".shields.obstacles.")
     there = arrays_in(changing(other)).values()
     return [
         name
         for name, array in arrays_in(changing(one)).items()
-        if not name.endswith(constant) and any(np.may_share_memory(array, its) for its in there)
+        if not name.endswith(constant)
+        and not any(part in name for part in ground)
+        and any(np.may_share_memory(array, its) for its in there)
     ]
 
 

@@ -30,7 +30,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.problem.kinds import ALONE, COUNTER, FREE, KEEP_RULES, NUDGED, OWN
-from dubins_traffic.roads.table import pack_distinct
+from dubins_traffic.roads.table import RoadTable, pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.agents.counter import CounterTeam
@@ -69,9 +69,6 @@ class Fleet:
         self._counter = _counter() if COUNTER in kinds else None
         if self._counter is not None:
             self._counter.reset(instances, state)
-        self._free = _free() if FREE in kinds else None
-        if self._free is not None:
-            self._free.reset(instances, state)
         self._own = OwnAgents() if OWN in kinds else None
         if self._own is not None:
             self._own.reset(instances, state)
@@ -80,6 +77,8 @@ class Fleet:
             [instance.problem.network for instance in instances],
             [instance.problem.car.lane_width for instance in instances],
         )
+        free = any(agent.kind == FREE for instance in instances for agent in instance.e_agents)
+        self._free = _free(instances, cars, self._roads, net) if free else None
         self._obstacles = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._agents = pack_agents(instances, cars, net)
         self._work = workspace(cars, PAIRS, 2 * int(np.diff(self._roads.seg_off).max()))
@@ -93,10 +92,10 @@ class Fleet:
             self._decide_others(tick, state, commands)
         if self._lawful is not None:
             self._lawful.decide(tick, state, labels, commands)
+            if self._free is not None:
+                self._free.decide(tick, state, self._lawful.drivers, commands)
         if self._counter is not None:
             self._counter.decide(tick, state, labels, commands)
-        if self._free is not None:
-            self._free.decide(tick, state, labels, commands)
         if self._own is not None:
             self._own.decide(tick, state, labels, commands)
         if len(self._agents.recalled):
@@ -110,7 +109,7 @@ class Fleet:
     def reseed(self, seed: int) -> None:
         """Let what is drawn from now on follow from another seed."""
         self._agents.team["seed"] = seed
-        for team in (self._lawful, self._counter, self._free, self._own):
+        for team in (self._lawful, self._counter, self._own):
             if team is not None:
                 team.reseed(seed)
 
@@ -173,11 +172,11 @@ def _counter() -> CounterTeam:
     return CounterTeam()
 
 
-def _free() -> FreeCars:
-    """Return the driver of the cars that do anything within E1 to E6."""
+def _free(instances: Sequence[Instance], cars: int, roads: RoadTable, net: Ints) -> FreeCars:
+    """Return what lets cars do anything within E1 to E6; its kernels are imported only if there are such cars."""
     from dubins_traffic.agents.free import FreeCars
 
-    return FreeCars()
+    return FreeCars(instances, cars, roads, net)
 
 
 def _teams(instances: Sequence[Instance], agents: Rows[Agent], net: Ints) -> Rows[Team]:

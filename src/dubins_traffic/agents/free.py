@@ -1,37 +1,45 @@
-"""E-agents of the kind `free`: much that E1 to E6 allow and no other kind does.
+"""E-agents of the kind `free`: much that E1 to E6 allow and no other kind does (compiled).
 
-A free car does as its commands say, or as a random walk does, until one of its clocks says that the law must take over:
+A free car does as its whims say, drawn at random or given, until one of its clocks says that the law must take over:
 those of the referee for E3 to E6, early enough that the law (`policies.rules.policy`) still keeps them. Whatever it
-does goes through a shield (`shield.car_shields`), which keeps E1 and E2.
+does goes through a shield (`shield.nearest_command`), which keeps E1 and E2.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dubins_traffic.agents.lawful import Lawful
+from dubins_traffic.agents.lawful import drivers_of
 from dubins_traffic.cars.body import Disc
-from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.errors import InputError
+from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.observations.viewpoints import Viewpoints
-from dubins_traffic.problem.instance import EAgent
-from dubins_traffic.problem.kinds import FREE, REMOTE, parameters_of
+from dubins_traffic.kernels.calls import bound
+from dubins_traffic.kernels.compile import jit, jit_rare
+from dubins_traffic.kernels.random import DRAW, uniform
+from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.observations.viewpoints import show
+from dubins_traffic.policies.rules.right_of_way import GOES_NOW
+from dubins_traffic.policies.rules.tables import KIND, Driver, Drivers, Traffic, scratch
+from dubins_traffic.problem.kinds import FREE, parameters_of
+from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at, lane_start
+from dubins_traffic.roads.table import RoadTable
+from dubins_traffic.rules.breach_log import RefereeTables
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.referee import Referee
-from dubins_traffic.shield.car_shields import CarShields
+from dubins_traffic.shield.nearest_command import shield_trial
+from dubins_traffic.shield.tables import ShieldTables, shield_tables
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.problem.instance import EAgent, Instance
 
-STREAM: Final = 0xF4EE
-"""Apart from all other streams of random numbers that follow from the seed."""
 LINGER: Final = 0.06
 """Share of E4's time that a free car may spend as it likes in a stay with a free exit; the law needs the rest."""
 DRIVE: Final = 2.5
@@ -47,227 +55,376 @@ NEAR: Final = 1.5
 APART: Final = 0.5
 """A free car does not move toward a body that is nearer than this, metres, of its own accord: the law would then wait
 for that one to go."""
+ASKEW, ALONG = 0.1, 0.99
+"""How far from the middle of its lane, metres, and how far from its direction, a cosine, a body that is no disc still
+moves as it likes: it needs room to turn, which who stands behind it at a line would not leave."""
 SHORT, LONG = 0.2, 5.0
 """Seconds for which a whim lasts."""
-FIRST: Final = FLAG.STOPPED | FLAG.FIRST | FLAG.CLEAR
+AS_THE_LAW: Final = 1.0
+NOTHING_GIVEN: Final = -1.0
 
 
-@dataclass(slots=True)
-class _Whims:
-    """What one free car likes to do: its parameters, its random numbers, and the present whim."""
+@record
+class Whim:
+    """What a free car likes to do for a while."""
 
-    given: Mapping[str, Any]
-    dice: np.random.Generator
+    end: float
+    """The tick of its list at which it ends."""
+    share: float
+    """Share of the law's command; negative: `speed` and `yaw_rate` instead."""
     speed: float
+    """m/s."""
     yaw_rate: float
-    turns: bool
-    """Whether it turns of its own accord: a body that is no disc would stand in the way of others, tilted."""
-    until: float = -1.0
-    """When the present whim ends, seconds."""
-    slows: float = 1.0
-    """Share of the law's speed, where it does as the law says."""
-    likes: tuple[float, float] | None = None
-    """Speed and yaw rate of the present whim, m/s and rad/s; None: as the law says."""
-    hold: float = -1.0
-    """Seconds of its own turn for which it holds at the line where it has stopped; -1 elsewhere."""
+    """rad/s."""
+    hold: float
+    """Share of the time for which it may hold at a line that it does hold there; negative: drawn."""
 
-    def ask(self, time: float, law: tuple[float, float]) -> tuple[float, float]:
-        """Return what it likes to do at a time, s, if the law says `law`."""
-        commands: Sequence[Sequence[float]] = self.given["commands"]
-        if commands:
-            return self._played(time, commands, law)
-        if time >= self.until:
-            self._think(time)
-        return (law[0] * self.slows, law[1] * self.slows) if self.likes is None else self.likes
 
-    def _played(
-        self, time: float, commands: Sequence[Sequence[float]], law: tuple[float, float]
-    ) -> tuple[float, float]:
-        whole = math.fsum(row[0] for row in commands)
-        left = time % whole if self.given["repeat"] and whole > 0.0 else time
-        for seconds, speed, yaw_rate in commands:
-            if left < seconds:
-                return speed, yaw_rate
-            left -= seconds
-        return law
+@record
+class FreeCar:
+    """A free car: its parameters and its memory; times are in ticks."""
 
-    def _think(self, time: float) -> None:
-        """Draw the next whim."""
-        dice = self.dice
-        self.until = time + float(dice.uniform(SHORT, LONG))
-        self.slows = 1.0
-        if dice.random() >= self.given["boldness"]:
-            self.likes = None
-            return
-        kind, share = int(dice.integers(6 if self.turns else 4)), float(dice.random())
-        turn = float(dice.uniform(-1.0, 1.0)) * self.yaw_rate
-        if kind == 0:
-            self.likes = 0.0, 0.0
-        elif kind == 1:
-            self.likes = -share * self.speed, 0.0
-        elif kind == 2:
-            self.likes = share * self.speed, 0.0
-        elif kind == 3:
-            self.likes, self.slows = None, share
-        elif kind == 4:
-            self.likes = float(dice.uniform(-1.0, 1.0)) * self.speed, turn * share
-        else:
-            self.likes = 0.0, turn
+    boldness: float
+    """Share of its time in which it does not do as the law says."""
+    fastest: float
+    """m/s."""
+    yaw_most: float
+    """rad/s."""
+    turns: int
+    """1 if it turns of its own accord: a body that is no disc would stand in the way of others, tilted."""
+    repeat: int
+    """1 if its whims begin again after the last."""
+    first: int
+    """Its first row of `Free.whim`."""
+    last: int
+    """The row after its last one; without any they are drawn."""
+    rate: float
+    """Ticks of a second."""
+    apart: float
+    """It does not move of its own accord toward who is nearer than this, metres."""
+    near: float
+    """How near to a goal that has been taken for long the law drives it, metres."""
+    stay: int
+    """For how long it does as it likes in a disc with a free exit."""
+    start: int
+    """E5's first ticks of a journey."""
+    journey: int
+    """After how long on a journey the law drives."""
+    crowded: int
+    """After how long that a goal is taken the law drives who is near."""
+    wait: int
+    """For how long it may hold at its line."""
+    place: int
+    """The row of its present whim, where they are given."""
+    until: int
+    """When the present whim ends, where they are drawn."""
+    share: float = AS_THE_LAW
+    """The present whim: as `Whim.share`, `Whim.speed` and `Whim.yaw_rate`."""
+    speed: float
+    """m/s."""
+    yaw_rate: float
+    """rad/s."""
+    patience: float = NOTHING_GIVEN
+    """As `Whim.hold`."""
+    hold: int = -1
+    """For how long of its own turn it holds at the line where it has stopped; -1 elsewhere."""
+    stopped_in: int = -1
+    """The lane in which it has stopped at the line, -1 if it has not in this one."""
 
-    def wait(self, longest: float) -> None:
-        """Draw for how long it holds at the next line, at most `longest` seconds."""
-        self.hold = (
-            float(self.dice.uniform(0.0, longest)) if self.dice.random() < self.given["boldness"] else 0.0
-        )
+
+class Free(Tables):
+    """The F free cars of a batch.
+
+    `row` (B, N): which of them a car is, -1 for none; `car` (F,); `whim` (W,): what is given, one car's after
+    another's; `traffic`: F rows, each what one of them sees, in the ego's place; `shields` and `commands` (F, N, 2).
+    """
+
+    row: Ints
+    car: Rows[FreeCar]
+    whim: Rows[Whim]
+    traffic: Traffic
+    shields: ShieldTables
+    commands: Floats
+
+
+@jit_rare
+def decide_free(
+    b: int, tick: int, commands: Floats, drivers: Drivers, judging: RefereeTables, free: Free
+) -> None:
+    """Replace the commands of the free cars of trial b, which are those of the law, by what they like and may do.
+
+    `drivers` has the trial's seed; frame `tick` has been labelled and judged.
+    """
+    state, labels = judging.state, judging.labels
+    for n in range(EGO + 1, state.count[b]):
+        f = int(free.row[b, n])
+        if f < 0:
+            continue
+        _like(b, n, tick, commands, drivers, judging, free)
+        show(b, n, f, state, labels, free.traffic.state, free.traffic.labels)
+        free.commands[f, EGO, 0], free.commands[f, EGO, 1] = commands[b, n, 0], commands[b, n, 1]
+        sight2 = float(free.shields.ego[f].sight2)
+        shield_trial(f, tick, sight2, free.traffic, free.shields, free.commands)
+        commands[b, n, 0], commands[b, n, 1] = free.commands[f, EGO, 0], free.commands[f, EGO, 1]
+
+
+@jit
+def _like(
+    b: int, n: int, tick: int, commands: Floats, drivers: Drivers, judging: RefereeTables, free: Free
+) -> None:
+    """Replace the command of car n, which is the law's, by what it likes to do, as far as its clocks allow that."""
+    own = free.car[int(free.row[b, n])]
+    if own.first < own.last:
+        _play(tick, own, free.whim)
+    elif tick >= own.until:
+        _think(b, n, tick, own, drivers)
+    owes = _owes(b, n, tick, own, judging)
+    if _holds(b, n, tick, own, drivers, judging):
+        commands[b, n, 0] = commands[b, n, 1] = 0.0
+    elif not owes and own.share >= 0.0:
+        commands[b, n, 0] *= own.share
+        commands[b, n, 1] *= own.share
+    elif not owes and _may(b, n, own, judging):
+        commands[b, n, 0], commands[b, n, 1] = own.speed, own.yaw_rate
+
+
+@jit
+def _play(tick: int, own: FreeCar, whims: Rows[Whim]) -> None:
+    """Set the present whim to that which is given for a tick; after the last one the law drives."""
+    total = int(whims[own.last - 1].end)
+    if total == 0 or (tick >= total and own.repeat == 0):
+        own.share, own.patience = AS_THE_LAW, 0.0
+        return
+    now = tick % total
+    row = own.place
+    if row < own.first or (row > own.first and whims[row - 1].end > now):
+        row = own.first
+    while whims[row].end <= now:
+        row += 1
+    own.place = row
+    own.share, own.speed, own.yaw_rate = whims[row].share, whims[row].speed, whims[row].yaw_rate
+    own.patience = whims[row].hold
+
+
+@jit_rare
+def _think(b: int, n: int, tick: int, own: FreeCar, drivers: Drivers) -> None:
+    """Draw the next whim."""
+    seed, trial = drivers.seed[b], drivers.trial[b]
+    seconds = SHORT + (LONG - SHORT) * uniform(seed, trial, n, tick, DRAW.FREE)
+    own.until = tick + max(1, int(seconds * own.rate))
+    own.share = AS_THE_LAW
+    if uniform(seed, trial, n, tick, DRAW.FREE + 1) >= own.boldness:
+        return
+    kind = int((6.0 if own.turns != 0 else 4.0) * uniform(seed, trial, n, tick, DRAW.FREE + 2))
+    share = uniform(seed, trial, n, tick, DRAW.FREE + 3)
+    if kind == 0:
+        own.share = share
+        return
+    turn = (2.0 * uniform(seed, trial, n, tick, DRAW.FREE + 4) - 1.0) * own.yaw_most
+    own.share, own.speed, own.yaw_rate = NOTHING_GIVEN, 0.0, 0.0
+    if kind == 2:
+        own.speed = -share * own.fastest
+    elif kind == 3:
+        own.speed = share * own.fastest
+    elif kind == 4:
+        own.speed = (2.0 * uniform(seed, trial, n, tick, DRAW.FREE + 5) - 1.0) * own.fastest
+        own.yaw_rate = turn * share
+    elif kind == 5:
+        own.yaw_rate = turn
+
+
+@jit
+def _may(b: int, n: int, own: FreeCar, judging: RefereeTables) -> bool:
+    """Tell whether a car may do what it likes: it stays apart from others, and along its lane unless it turns.
+
+    In a disc it only stands, since from elsewhere than its way the law might not leave the disc in time (E4).
+    """
+    state, labels, roads, rules = judging.state, judging.labels, judging.roads, judging.rules[b]
+    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
+    if own.speed == 0.0 and own.yaw_rate == 0.0:
+        return True
+    if labels.at[b, n] >= 0 or (own.speed < 0.0 and _backs_in(b, n, own, judging)):
+        return False
+    if own.turns == 0 and own.speed != 0.0:
+        lane = labels.lane[b, n]
+        segment = roads.segment[int(roads.seg_off[rules.net]) + int(labels.segment[b, n])]
+        if lane < 0 or segment.piece >= 0:
+            return False
+        tx, ty = lane_direction_at(roads, rules.net, lane, x, y)
+        _, lateral = lane_coordinates(roads, rules.net, lane, x, y)
+        if c * tx + s * ty < ALONG or abs(lateral + judging.terms[b].lane_middle) > ASKEW:
+            return False
+    for k in range(state.count[b]):
+        dx, dy = state.x[b, k] - x, state.y[b, k] - y
+        if (dx * c + dy * s) * own.speed > 0.0 and dx * dx + dy * dy < own.apart * own.apart:
+            return False
+    return True
+
+
+@jit
+def _backs_in(b: int, n: int, own: FreeCar, judging: RefereeTables) -> bool:
+    """Tell whether a car that backs up brings its centre into the disc from which it came."""
+    roads, rules, lane = judging.roads, judging.rules[b], judging.labels.lane[b, n]
+    if lane < 0:
+        return True
+    corner = roads.vertex[int(roads.vert_off[rules.net]) + lane_start(roads, rules.net, lane)]
+    dx, dy = judging.state.x[b, n] - corner.x, judging.state.y[b, n] - corner.y
+    far = rules.radius - own.speed / own.rate
+    return bool(dx * dx + dy * dy < far * far)
+
+
+@jit
+def _owes(b: int, n: int, tick: int, own: FreeCar, judging: RefereeTables) -> bool:
+    """Tell whether the law has to drive a car now, so that it keeps E3 to E6."""
+    labels, log, terms = judging.labels, judging.log, judging.terms[b]
+    car = log.car[b, n]
+    lane, bits = labels.lane[b, n], np.int64(labels.bits[b, n])
+    stopped = bits & FLAG.STOPPED != 0
+    if stopped:
+        own.stopped_in = lane
+    elif own.stopped_in != lane:
+        own.stopped_in = -1
+    run = tick - car.exit_since - car.exit_paused if car.exit_since >= 0 else 0
+    found = labels.crosses[b, n] >= 0 and car.exit_spent + run >= own.stay
+    found = found or min(tick - car.journey_since, own.start) + car.journey_spent >= own.journey
+    found = found or own.stopped_in >= 0 or bits & FLAG.LEFT != 0
+    for g in range(terms.goals_begin, terms.goals_end):
+        goal = log.goal[g]
+        found = found or labels.at[b, n] == goal.vertex
+        if 0 <= goal.since <= tick - own.crowded:
+            corner = judging.roads.vertex[int(judging.roads.vert_off[judging.rules[b].net]) + goal.vertex]
+            dx, dy = judging.state.x[b, n] - corner.x, judging.state.y[b, n] - corner.y
+            found = found or dx * dx + dy * dy < own.near * own.near
+    return found
+
+
+@jit
+def _holds(b: int, n: int, tick: int, own: FreeCar, drivers: Drivers, judging: RefereeTables) -> bool:
+    """Tell whether a car holds at its line, where it is its turn."""
+    bits = np.int64(judging.labels.bits[b, n])
+    if bits & FLAG.STOPPED == 0:
+        own.hold = -1
+        return False
+    if own.hold < 0:
+        own.hold = int(own.wait * _patience(b, n, tick, own, drivers))
+    since = judging.log.car[b, n].first_since
+    if bits & GOES_NOW != GOES_NOW or bits & FLAG.FORFEITED != 0 or since < 0:
+        return False
+    return tick - since < own.hold
+
+
+@jit_rare
+def _patience(b: int, n: int, tick: int, own: FreeCar, drivers: Drivers) -> float:
+    """Return for which share of the time that it may a car holds at the next line, as given or drawn."""
+    if own.patience >= 0.0:
+        return own.patience
+    seed, trial = drivers.seed[b], drivers.trial[b]
+    bold = uniform(seed, trial, n, tick, DRAW.FREE + 6) < own.boldness
+    return uniform(seed, trial, n, tick, DRAW.FREE + 7) if bold else 0.0
+
+
+def free_tables(instances: Sequence[Instance], cars: int, roads: RoadTable, net: Ints) -> Free:
+    """Return the free cars of a batch with `cars` places a trial, before the first tick.
+
+    `net` (B,) are the numbers of the trials' networks in `roads`.
+    """
+    found = [
+        (b, n)
+        for b, own in enumerate(instances)
+        for n, agent in enumerate(own.e_agents, start=1)
+        if agent.kind == FREE
+    ]
+    row = np.full((len(instances), cars), -1)
+    for f, place in enumerate(found):
+        row[place] = f
+    own = [instances[b] for b, _ in found] or list(instances[:1])
+    problems = [instance.problem for instance in own]
+    nets = np.array([net[b] for b, _ in found] or [net[0]])
+    bodies = pack_obstacles([problem.obstacles for problem in problems])
+    shielded = table(Driver, (len(own), cars))
+    shielded["kind"][:, EGO] = KIND.ROUND
+    shielded["speed"][:, EGO] = [problem.car.bounds.speed for problem in problems]
+    traffic = Traffic(
+        State.zeros(len(own), cars),
+        Labels.zeros(len(own), cars),
+        roads,
+        bodies,
+        drivers_of(own, nets, shielded, np.zeros(0, dtype=np.int64), np.zeros((0, 0))),
+        scratch(cars, int(np.diff(roads.seg_off).max()), bodies),
+    )
+    rows, whims = table(FreeCar, len(own)), list[tuple[float, ...]]()
+    for f, (b, n) in enumerate(found):
+        _describe(instances[b], instances[b].e_agents[n - 1], rows[f], whims)
+    given = table(Whim, len(whims))
+    for name, values in zip(
+        ("end", "share", "speed", "yaw_rate", "hold"), zip(*whims, strict=True), strict=False
+    ):
+        given[name] = values
+    return Free(row, rows, given, traffic, shield_tables(problems, traffic), np.zeros((len(own), cars, 2)))
+
+
+def _describe(instance: Instance, agent: EAgent, car: FreeCar, whims: list[tuple[float, ...]]) -> None:
+    """Fill the row of a free car, and append what is given for it to `whims`."""
+    problem = instance.problem
+    rules, rate, bounds = RuleParameters.from_mapping(problem.rules), problem.rate, problem.car.bounds
+    given = {**parameters_of(FREE, {}), **agent.parameters}
+    car.boldness, car.repeat, car.rate = given["boldness"], given["repeat"], rate
+    car.fastest, car.yaw_most = bounds.speed, bounds.yaw_rate
+    car.turns = isinstance(problem.car.body, Disc)
+    car.apart = 2.0 * problem.car.body.reach + APART
+    car.near = problem.intersection_radius + NEAR
+    longest = float(problem.network.lengths.max()) / bounds.speed
+    journey = rules.rest_time + rules.journey_lengths * longest - DRIVE * longest - RESERVE
+    car.journey = math.floor(max(journey, 0.0) * rate)
+    car.start = math.ceil(rules.journey_start_time * rate)
+    car.stay = math.floor(LINGER * rules.exit_time * rate)
+    car.crowded = math.floor(CROWD * rules.goal_time * rate)
+    longest_turn = rules.enter_time if rules.tickets > 0 else min(rules.enter_time, rules.forfeit_time)
+    car.wait = math.floor(WAIT * longest_turn * rate)
+    rows: Sequence[Sequence[float]] = given["whims"] or [
+        (seconds, NOTHING_GIVEN, speed, yaw_rate, NOTHING_GIVEN)
+        for seconds, speed, yaw_rate in given["commands"]
+    ]
+    car.first = car.place = len(whims)
+    time = 0.0
+    for seconds, *rest in rows:
+        time += seconds
+        whims.append((float(math.ceil(time * rate - 1e-9)), *rest))
+    car.last = len(whims)
 
 
 class FreeCars:
-    """Drives the e-agents of kind `free` of one trial (a `protocols.Driver`); all others are left alone."""
+    """Lets the free cars of a batch do as they like (after `lawful.Lawful`, whose commands for them it replaces).
 
-    def reset(self, instances: Sequence[Instance], state: State) -> None:
-        """Begin a trial whose first frame is `state`.
+    Parameters
+    ----------
+    instances : sequence of Instance
+        One a trial.
+    roads, net
+        The trials' networks, and their numbers there, (B,).
+    """
 
-        Raises
-        ------
-        InputError
-            If there are several trials, or the cars can't keep the law.
-        """
-        if len(instances) != 1:
-            raise InputError(
-                "such e-agents are not batched", field="type", value=FREE, expected="one trial at a time"
-            )
-        (instance,) = instances
-        problem = instance.problem
-        self._instance = instance
-        rules = RuleParameters.from_mapping(problem.rules)
-        self._rate = problem.rate
-        self._cars = [n for n, agent in enumerate(instance.e_agents, start=1) if agent.kind == FREE]
-        self._whims = [self._begun(n, instance.seed) for n in self._cars]
-        self._state, self._labels = State.zeros(*state.x.shape), Labels.zeros(*state.x.shape)
-        _copy(state, self._state)
-        law = _as_lawful(instance)
-        self._law = Lawful()
-        self._law.reset([law], self._state)
-        judged = replace(problem, rules=rules.to_mapping())
-        self._referee = Referee([replace(instance, problem=judged)])
-        self._views = Viewpoints(self._state, self._labels)
-        which = np.zeros(state.x.shape, dtype=np.bool_)
-        which[0, self._cars] = True
-        self._shields = CarShields([judged], self._views, which)
-        longest = float(problem.network.lengths.max()) / problem.car.bounds.speed
-        journey = rules.rest_time + rules.journey_lengths * longest - DRIVE * longest - RESERVE
-        self._journey = math.floor(max(journey, 0.0) * self._rate)
-        self._start = math.ceil(rules.journey_start_time * self._rate)
-        self._stay = math.floor(LINGER * rules.exit_time * self._rate)
-        self._crowded = math.floor(CROWD * rules.goal_time * self._rate)
-        self._wait = WAIT * (
-            rules.enter_time if rules.tickets > 0 else min(rules.enter_time, rules.forfeit_time)
-        )
-        self._points: Floats = np.asarray(problem.network.points)
-        self._near = problem.intersection_radius + NEAR
-        self._bent = np.asarray(problem.network.bent, dtype=bool)
-        self._apart = 2.0 * problem.car.body.reach + APART
-        self._waited: Ints = np.full(state.x.shape[1], -1)
-        self._asked = np.zeros((*state.x.shape, 2))
+    def __init__(self, instances: Sequence[Instance], cars: int, roads: RoadTable, net: Ints) -> None:
+        judged = [replace(own, problem=_judged(own.problem)) for own in instances]
+        self._trials = [
+            b for b, own in enumerate(instances) if any(agent.kind == FREE for agent in own.e_agents)
+        ]
+        self._referee = Referee(judged)
+        self._free = free_tables(instances, cars, roads, net)
+        self._decide = bound(decide_free)
+        self._nothing = [()] * len(instances)
 
-    def _begun(self, car: int, seed: int) -> _Whims:
-        agent = self._instance.e_agents[car - 1]
-        bounds = self._instance.problem.car.bounds
-        words = [STREAM, seed & 0xFFFFFFFF, seed >> 32, self._instance.trial, car]
-        dice = np.random.Generator(np.random.PCG64(np.random.SeedSequence(words)))
-        given = {**parameters_of(FREE, {}), **agent.parameters}
-        round_body = isinstance(self._instance.problem.car.body, Disc)
-        return _Whims(given, dice, bounds.speed, bounds.yaw_rate, round_body)
-
-    def reseed(self, seed: int) -> None:
-        """Let what is drawn from now on follow from another seed."""
-        self._law.reseed(seed)
-        for car, own in zip(self._cars, self._whims, strict=True):
-            own.dice = self._begun(car, seed).dice
-
-    def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
-        """Write the commands of these cars for [t_k, t_k+1) into `commands` (1, N, 2)."""
-        _copy(state, self._state)
-        _copy(labels, self._labels)
+    def decide(self, tick: int, state: State, drivers: Drivers, commands: Floats) -> None:
+        """Replace the commands of these cars for [t_k, t_k+1) in `commands` (B, N, 2); `drivers` are the law's."""
         if tick == 0:
-            self._referee.reset(self._state)
+            self._referee.reset(state)
         else:
-            self._referee.update(tick, self._state, [()])
-        asked = self._asked
-        asked[:] = 0.0
-        self._law.decide(tick, self._state, self._labels, asked)
-        owes = self._owes(tick)
-        time = tick / self._rate
-        for car, own in zip(self._cars, self._whims, strict=True):
-            law = float(asked[0, car, 0]), float(asked[0, car, 1])
-            likes = own.ask(time, law)
-            if self._holds(tick, car, own):
-                asked[0, car] = 0.0
-            elif not owes[car] and (own.likes is None or self._may(car, likes, own)):
-                asked[0, car] = likes
-        self._views.look(np.zeros(1, dtype=np.int64))
-        self._shields.filter(np.array([tick]), asked)
-        commands[0, self._cars] = asked[0, self._cars]
-
-    def _may(self, car: int, likes: tuple[float, float], own: _Whims) -> bool:
-        """Tell whether a car may do what it likes: it stays apart from others, and straight unless it turns."""
-        state, speed = self._state, likes[0]
-        if not own.turns and (self._labels.at[0, car] >= 0 or self._bent[self._labels.segment[0, car]]):
-            return speed == 0.0
-        x, y = state.x[0] - state.x[0, car], state.y[0] - state.y[0, car]
-        toward = (x * state.c[0, car] + y * state.s[0, car]) * speed > 0.0
-        return not bool((toward & (np.hypot(x, y) < self._apart)).any())
-
-    def _owes(self, tick: int) -> np.ndarray[Any, np.dtype[np.bool_]]:
-        """Tell which cars the law has to take over, (N,)."""
-        clocks, labels = self._referee.clocks, self._labels
-        lane, bits = labels.lane[0], labels.bits[0].astype(np.int64)
-        stays = labels.crosses[0] >= 0
-        since = clocks["exit_since"][0]
-        run = np.where(since >= 0, tick - since - clocks["exit_paused"][0], 0)
-        found = stays & (clocks["exit_spent"][0] + run >= self._stay)
-        long = np.minimum(tick - clocks["journey_since"][0], self._start) + clocks["journey_spent"][0]
-        found |= long >= self._journey
-        stopped = bits & FLAG.STOPPED != 0
-        self._waited = np.where(stopped, lane, np.where(self._waited == lane, self._waited, -1))
-        found |= stopped | ((self._waited >= 0) & (self._waited == lane))
-        found |= bits & FLAG.LEFT != 0
-        goals = self._referee.goals
-        for v, taken in zip(goals["vertex"].tolist(), goals["since"].tolist(), strict=True):
-            found |= labels.at[0] == v
-            if 0 <= taken <= tick - self._crowded:
-                x, y = self._points[v]
-                found |= np.hypot(self._state.x[0] - x, self._state.y[0] - y) < self._near
-        return found
-
-    def _holds(self, tick: int, car: int, own: _Whims) -> bool:
-        """Tell whether a car holds at its line, where it is its turn."""
-        bits = int(self._labels.bits[0, car])
-        if bits & FLAG.STOPPED == 0:
-            own.hold = -1.0
-            return False
-        if own.hold < 0.0:
-            own.wait(self._wait)
-        since = int(self._referee.clocks["first_since"][0, car])
-        if bits & FIRST != FIRST or bits & FLAG.FORFEITED != 0 or since < 0:
-            return False
-        return (tick - since) / self._rate < own.hold
+            self._referee.update(tick, state, self._nothing)
+        judging = self._referee.tables(state)
+        for b in self._trials:
+            self._decide(b, tick, commands, drivers, judging, self._free)
 
 
-def _copy(source: State | Labels, to: State | Labels) -> None:
-    """Copy all arrays of a frame."""
-    for old, new in zip(source, to, strict=True):
-        new[...] = old
-
-
-def _as_lawful(instance: Instance) -> Instance:
-    """Return an instance in which the law drives the free cars, at top speed, and nobody else."""
-    speed = instance.problem.car.bounds.speed
-    own = parameters_of("lawful", {"speed": speed})
-    agents = [
-        EAgent("lawful", agent.name, "lawful", own)
-        if agent.kind == FREE
-        else EAgent(REMOTE, agent.name, agent.type)
-        for agent in instance.e_agents
-    ]
-    return replace(instance, e_agents=tuple(agents))
+def _judged(problem: Any) -> Any:
+    """Return a problem that is judged by the rules, whether it says so or not."""
+    return replace(problem, rules=RuleParameters.from_mapping(problem.rules).to_mapping())

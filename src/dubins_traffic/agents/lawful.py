@@ -60,6 +60,11 @@ class Lawful:
             scratch(cars, int(np.diff(roads.seg_off).max()), bodies),
         )
 
+    @property
+    def drivers(self) -> Drivers:
+        """What the law knows of the cars."""
+        return self._traffic.drivers
+
     def reseed(self, seed: int) -> None:
         """Let what is drawn from now on follow from another seed."""
         self._traffic.drivers.seed[:] = seed

@@ -10,6 +10,7 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from dubins_traffic.agents.free import Free, decide_free
 from dubins_traffic.agents.kernel import decide_trial as decide_others
 from dubins_traffic.agents.nudge import nudge_trial
 from dubins_traffic.agents.tables import Scene
@@ -72,6 +73,8 @@ class TrialProgress:
     """1 if the law drives some of its cars."""
     others: int
     """1 if other built-in drivers drive some of its cars."""
+    free: int
+    """1 if some of its e-agents are free."""
     nudged: int
     """1 if some of its e-agents are nudged."""
     ends: int
@@ -127,6 +130,7 @@ class World(Scene, Traffic, Motion, Counted):
     memory: Memory
     breach_log: BreachLog
     progress: Progress
+    free: Free
     labelling: LabelTables
     judging: RefereeTables
     """The same tables, as labels and referee take them."""
@@ -214,6 +218,8 @@ def _decide(b: int, tick: int, commands: Floats, own: TrialProgress, world: Worl
         decide_lawful(
             b, tick, own.sight2, spacing.apart[b], spacing_loss(spacing, b, tick), world, commands
         )  # fmt: skip
+    if own.free != 0:
+        decide_free(b, tick, commands, world.drivers, world.judging, world.free)
     if own.nudged != 0:
         nudge_trial(b, tick, commands, world.agents)
     own.decided = 1

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from dubins_traffic.agents.free import Free
 from dubins_traffic.agents.tables import Agents
 from dubins_traffic.cars.rows import rows
 from dubins_traffic.cars.tables import ObstacleTable
@@ -22,6 +23,7 @@ from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.rules.breach_log import BreachLog, FoundBreach, RefereeParameters, RefereeTables
 from dubins_traffic.rules.tables import LabelTables, spread
 from dubins_traffic.scoring.tally import Tally
+from dubins_traffic.shield.tables import Alone, ShieldTables
 
 Table = TypeVar("Table", bound=Tables)
 
@@ -94,6 +96,7 @@ def world_of(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, d
             place=table(BreachPlace, len(progress.place)),
         ),
         spacing=spacing,
+        free=_free(world.free, trials),
         labelling=LabelTables(state, roads, beside, rules, labels, memory),
         judging=RefereeTables(state, roads, beside, rules, terms, labels, memory, breach_log, spacing),
     )
@@ -150,6 +153,39 @@ def _tally(tally: Tally, trials: Ints) -> Tally:
     own["first_goal"], own["last_goal"] = goals.off[:-1], goals.off[1:]
     names = "goal", "sample_done", "round_done", "early_done"
     return rows_of(tally, trials, trial=own, **{name: getattr(tally, name)[goals.row] for name in names})
+
+
+def _free(free: Free, trials: Ints) -> Free:
+    """Return the free cars of forks, each with a memory of its own."""
+    row = free.row[trials]
+    is_one = row >= 0
+    own = row[is_one]
+    row[is_one] = np.arange(len(own))
+    own = own if len(own) else np.zeros(1, dtype=np.int64)
+    shared = free.traffic.drivers
+    drivers = rows_of(shared, own, stage=shared.stage, distance=shared.distance, choice=shared.choice)
+    traffic = free.traffic.replace(
+        state=rows_of(free.traffic.state, own),
+        labels=rows_of(free.traffic.labels, own),
+        obstacles=_obstacles(free.traffic.obstacles, own),
+        drivers=drivers,
+        scratch=_copied(free.traffic.scratch),
+    )
+    alone = free.shields.alone
+    unseen = alone.traffic.replace(
+        state=rows_of(alone.traffic.state, own),
+        labels=rows_of(alone.traffic.labels, own),
+        obstacles=traffic.obstacles,
+        drivers=drivers.replace(
+            car=alone.traffic.drivers.car[own],
+            way=alone.traffic.drivers.way[own],
+            command=alone.traffic.drivers.command[own],
+        ),
+        scratch=traffic.scratch,
+    )
+    beside = free.shields.obstacles.replace(base=free.shields.obstacles.base[own])
+    shields = ShieldTables(free.shields.ego[own], beside, Alone(unseen, alone.commands[own]))
+    return Free(row, free.car[own], free.whim, traffic, shields, free.commands[own])
 
 
 def _agents(agents: Agents, trials: Ints, seeds: npt.NDArray[np.uint64] | None) -> Agents:

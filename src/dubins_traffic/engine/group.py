@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dubins_traffic.agents.fleet import PAIRS, pack_agents
+from dubins_traffic.agents.free import free_tables
 from dubins_traffic.agents.lawful import pack_drivers
 from dubins_traffic.agents.tables import wider, workspace
 from dubins_traffic.cars.near import spacing
@@ -32,7 +33,7 @@ from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import is_quick
 from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.policies.rules.tables import KIND, scratch
-from dubins_traffic.problem.kinds import KEEP_RULES, NUDGED, REMOTE
+from dubins_traffic.problem.kinds import FREE, KEEP_RULES, NUDGED, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
@@ -132,7 +133,7 @@ class Group:
             drivers=pack_drivers(instances, places, net, rounds), scratch=scratch(places, segments, obstacles),
             agents=pack_agents(instances, places, net), space=workspace(places, PAIRS, 2 * segments),
             tally=new_tally(instances, net, places), progress=self._progress(len(work.contact), len(breach_log.row)),
-            spacing=apart, labelling=labelling, judging=judging,
+            spacing=apart, labelling=labelling, judging=judging, free=free_tables(instances, places, roads, net),
         )  # fmt: skip
         self._note_rules()
         self.labels: Labels = labeller.labels
@@ -288,6 +289,8 @@ class Group:
         kinds = [{agent.driver.kind for agent in self.instances[b].e_agents} for b in fleets]
         nudged = [any(agent.kind == NUDGED for agent in self.instances[b].e_agents) for b in fleets]
         trial["nudged"] = np.array(nudged)[whose]
+        free = [any(agent.kind == FREE for agent in self.instances[b].e_agents) for b in fleets]
+        trial["free"] = np.array(free)[whose]
         trial["others"] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
         trial["sight2"] = np.square([instance.problem.sensing_radius for instance in self.instances])
         return Progress(trial, table(ContactNote, contacts), table(BreachPlace, breaches))

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from dubins_traffic.cars.body import DUBINS
 from dubins_traffic.errors import InputError
 from dubins_traffic.policies.rules.fitness import check_fit, check_speeds
-from dubins_traffic.problem.kinds import ALONE, KEEP_RULES
+from dubins_traffic.problem.kinds import ALONE, FREE, KEEP_RULES
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -30,10 +30,14 @@ def fitness() -> Callable[[Instance], bool]:
 
 
 def can_share(instance: Instance) -> bool:
-    """Tell whether a trial can be batched, whatever drives its ego."""
+    """Tell whether a trial can be batched, whatever drives its ego.
+
+    A free e-agent goes by the clocks of the referee, so there must be one.
+    """
     apart = any(agent.kind in ALONE for agent in instance.e_agents)
+    unjudged = not instance.problem.rules and any(agent.kind == FREE for agent in instance.e_agents)
     plain = instance.simulator == "embedded" and instance.problem.car.model == DUBINS
-    return plain and not instance.problem.formulas and not apart
+    return plain and not instance.problem.formulas and not apart and not unjudged
 
 
 def _is_fit(instance: Instance) -> bool:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from dubins_traffic.agents import choices
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats
@@ -25,21 +27,30 @@ class Genome:
         Other starts of some of its cars, by the cars' numbers.
     tables : mapping of int to (K, 7) float64
         What each e-agent chooses (`agents.choices`), by the cars' numbers.
+    whims : mapping of int to (K, 5) float64
+        What each free e-agent likes to do (`agents.whims`), by the cars' numbers.
     """
 
     base: int
     root: int
     starts: Mapping[int, Pose] = field(default_factory=dict[int, Pose])
     tables: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
+    whims: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
+
+    @property
+    def choosing(self) -> list[int]:
+        """The numbers of the cars of which something is chosen, in order."""
+        return sorted({*self.tables, *self.whims})
 
     def to_json(self) -> dict[str, Any]:
         """Return it as a JSON object, from which `from_json` makes an equal one."""
+        whims = {str(car): table.tolist() for car, table in self.whims.items()}
         return {
             "base": self.base,
             "root": self.root,
             "starts": {str(car): list(pose) for car, pose in self.starts.items()},
             "tables": {str(car): [len(table), choices.to_rows(table)] for car, table in self.tables.items()},
-        }
+        } | ({"whims": whims} if whims else {})
 
     @staticmethod
     def from_json(document: Mapping[str, Any]) -> Genome:
@@ -51,4 +62,5 @@ class Genome:
             table[: len(known)] = known
             tables[int(car)] = table
         starts = {int(car): Pose(*pose) for car, pose in document["starts"].items()}
-        return Genome(document["base"], document["root"], starts, tables)
+        whims = {int(car): np.array(rows) for car, rows in document.get("whims", {}).items()}
+        return Genome(document["base"], document["root"], starts, tables, whims)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
 
-from dubins_traffic.agents import choices
+from dubins_traffic.agents import choices, whims
 from dubins_traffic.agents.choices import CHOICE
 from dubins_traffic.cars.state import EGO, Pose
 from dubins_traffic.falsification.genome import Genome
@@ -76,7 +76,7 @@ def started(genome: Genome, base: Instance, starts: list[Pose], moved: Mapping[i
         for n, pose in enumerate(starts):
             if n != car and hypot(pose.x - own.x, pose.y - own.y) < apart:
                 return genome
-    return Genome(genome.base, genome.root, {**genome.starts, **moved}, genome.tables)
+    return Genome(genome.base, genome.root, {**genome.starts, **moved}, genome.tables, genome.whims)
 
 
 def span_of(base: Instance, pose: Pose) -> tuple[float, float] | None:
@@ -256,24 +256,28 @@ def changed(
     kind = dice.random()
     other, others = mate
     alike = others.problem.network is base.problem.network and others.e_agents == base.e_agents
-    if not cars and genome.tables:
-        return _choosing(genome, dice)
-    if OWN_CHOICE <= kind < OWN_START or not genome.tables:
+    chooses = bool(genome.choosing)
+    if not cars and chooses:
+        return _choosing(genome, base, dice)
+    if OWN_CHOICE <= kind < OWN_START or not chooses:
         return _shifted(genome, base, cars, dice)
     if OWN_START <= kind < JOINED:
         return joined(genome, base, cars, dice)
     if kind < OWN_CHOICE or not alike:
-        return _choosing(genome, dice)
+        return _choosing(genome, base, dice)
     if kind < OTHERS_CAR:
         return _with_car(genome, base, other, others, cars, dice)
     starts = starts_of(genome, base)
     return replace(genome, base=other.base, starts={n: starts[n] for n in cars})
 
 
-def _choosing(genome: Genome, dice: np.random.Generator) -> Genome:
-    """Return a genome of which one choice of one car is changed."""
-    cars = sorted(genome.tables)
+def _choosing(genome: Genome, base: Instance, dice: np.random.Generator) -> Genome:
+    """Return a genome of which one choice of one car is changed, or one of its whims."""
+    cars = genome.choosing
     car = cars[int(dice.integers(len(cars)))]
+    if car in genome.whims:
+        changed_whims = whims.mutated(dice, genome.whims[car], base.problem)
+        return replace(genome, whims={**genome.whims, car: changed_whims})
     return replace(genome, tables={**genome.tables, car: choices.mutated(dice, genome.tables[car])})
 
 
@@ -298,12 +302,16 @@ def _with_car(
     genome: Genome, base: Instance, other: Genome, others: Instance, cars: tuple[int, ...], dice: np.random.Generator
 ) -> Genome:  # fmt: skip
     """Return a genome of which one car starts where it does in another one, and chooses the same."""
-    shared = sorted(genome.tables.keys() & other.tables.keys() & set(cars))
+    shared = sorted(set(genome.choosing) & set(other.choosing) & set(cars))
     if not shared:
         return genome
     car = shared[int(dice.integers(len(shared)))]
     starts = starts_of(genome, base)
     starts[car] = starts_of(other, others)[car]
-    taken = replace(genome, tables={**genome.tables, car: other.tables[car]})
+    taken = (
+        replace(genome, whims={**genome.whims, car: other.whims[car]})
+        if car in genome.whims
+        else replace(genome, tables={**genome.tables, car: other.tables[car]})
+    )
     found = started(taken, base, starts, {car: starts[car]})
     return genome if found is taken else found

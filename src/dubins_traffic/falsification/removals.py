@@ -6,13 +6,13 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from dubins_traffic.agents import choices
+from dubins_traffic.agents import choices, whims
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.falsification.sampling import CHOSEN
 from dubins_traffic.logic.temporal import ticks
 from dubins_traffic.problem.instance import Disturbances, EAgent, Instance
-from dubins_traffic.problem.kinds import KINDS, parameters_of
+from dubins_traffic.problem.kinds import FREE, KINDS, parameters_of
 from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.network import RoadNetwork
 
@@ -25,7 +25,7 @@ LEAD: Final = 2.0
 """Seconds that a trial lasts at least before its breach, so that it shows how that came about."""
 REDRAWN: Final = 8
 """As so many trials, by their numbers, an instance with a car less is tried beside its own."""
-KEPT: Final = frozenset({"choices", "cycle", "commands", "kind", "parameters"})
+KEPT: Final = frozenset({"choices", "cycle", "commands", "whims", "kind", "parameters"})
 """Parameters of e-agents that have no default to go back to, or a way of their own to be taken away."""
 
 Removal = tuple[str, Instance]
@@ -77,6 +77,9 @@ def without_choices(instance: Instance, frames: Frames) -> Iterator[Removal]:  #
         if agent.kind == CHOSEN:
             for table in choices.reductions(choices.table_of(agent)):
                 yield f"a choice of {agent.name}", choices.with_choices(instance, {car: table})
+        if agent.kind == FREE:
+            for table in whims.reductions(whims.table_of(agent)):
+                yield f"a whim of {agent.name}", whims.with_whims(instance, {car: table})
         if agent.kind not in KINDS:
             continue
         for name, default in _defaults(agent).items():

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dubins_traffic.agents import choices
+from dubins_traffic.agents import choices, whims
 from dubins_traffic.falsification import moves
 from dubins_traffic.falsification.contract import CAPRICIOUS
 from dubins_traffic.falsification.genome import Genome
@@ -122,13 +122,20 @@ class Source:
         self._known = {number: own for number, own in self._known.items() if number in kept}
 
     def fresh(self, number: int) -> Genome:
-        """Return the genome of trial `number` of the configuration, with choices drawn for all cars that can choose."""
+        """Return the genome of trial `number` of the configuration, with choices drawn for all cars that can choose.
+
+        So are the whims of those that are free.
+        """
         instance = self._base(number)
         dice, legs = self.dice(number, Stream.CHOICES), _legs(instance)
         share = float(dice.uniform(0.05, 0.5))
-        return Genome(
-            number, number, {}, {car: choices.drawn(dice, legs, share) for car in free_cars(instance)}
-        )
+        tables = {car: choices.drawn(dice, legs, share) for car in free_cars(instance)}
+        liked = {
+            car: whims.drawn(dice, instance.problem)
+            for car, agent in enumerate(instance.e_agents, start=1)
+            if whims.searched(agent)
+        }
+        return Genome(number, number, {}, tables, liked)
 
     def varied(self, genome: Genome, mate: Genome, dice: np.random.Generator) -> Genome:
         """Return a genome with one thing changed, or a few; some are taken from another one, `mate`."""
@@ -164,9 +171,9 @@ def _freed(agent: EAgent) -> EAgent:
 
 
 def _built(base: Instance, genome: Genome) -> Instance:
-    if not genome.tables and not genome.starts:
-        return base
-    return choices.with_choices(base, genome.tables, genome.starts or None)
+    if genome.tables or genome.starts:
+        base = choices.with_choices(base, genome.tables, genome.starts or None)
+    return whims.with_whims(base, genome.whims) if genome.whims else base
 
 
 def _legs(instance: Instance) -> int:

@@ -290,6 +290,7 @@ class _Climb:
     def __init__(self, cma: Any, source: Source, base: int) -> None:
         self.base = base
         drawn = source.fresh(base)
+        self._whims = drawn.whims
         self._shapes = {car: table.shape for car, table in drawn.tables.items()}
         size = max(2, sum(rows * columns for rows, columns in self._shapes.values()))
         dice = source.dice(base, Stream.CHOICES)
@@ -324,7 +325,7 @@ class _Climb:
             tables[car] = low + (high - low) * share
             exits = np.minimum(np.floor(share[:, CHOICE.EXIT] * (high[CHOICE.EXIT] + 1)), high[CHOICE.EXIT])
             tables[car][:, CHOICE.EXIT] = exits
-        return Genome(self.base, self.base, {}, tables)
+        return Genome(self.base, self.base, {}, tables, self._whims)
 
 
 class Strategy(Protocol):

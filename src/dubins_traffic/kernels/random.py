@@ -31,6 +31,8 @@ class _Draw(NamedTuple):
     """What cars by the rules do, eleven numbers: exits take four, violations six, places one."""
     NUDGE: int = 40
     """How much faster or slower a nudged e-agent drives."""
+    FREE: int = 60
+    """What a free e-agent likes to do, eight numbers."""
     POSITION: int = 200
     """Noise of a sensed position, six numbers."""
     HEADING: int = 206

@@ -34,29 +34,26 @@ def turn_round(trials: Ints, views: ViewTables) -> None:
         count = views.state.count[b]
         for n in range(count):
             row = b * views.state.x.shape[1] + n
-            views.own_state.count[row] = count
-            _put(b, n, row, 0, views)
-            for j in range(n):
-                _put(b, j, row, j + 1, views)
-            for j in range(n + 1, count):
-                _put(b, j, row, j, views)
+            show(b, n, row, views.state, views.labels, views.own_state, views.own_labels)
 
 
 @jit
-def _put(b: int, car: int, row: int, place: int, views: ViewTables) -> None:
-    """Copy a car of a trial into a place of a row."""
-    state, labels, own, named = views.state, views.labels, views.own_state, views.own_labels
-    own.x[row, place] = state.x[b, car]
-    own.y[row, place] = state.y[b, car]
-    own.c[row, place] = state.c[b, car]
-    own.s[row, place] = state.s[b, car]
-    own.speed[row, place] = state.speed[b, car]
-    own.yaw_rate[row, place] = state.yaw_rate[b, car]
-    named.segment[row, place] = labels.segment[b, car]
-    named.at[row, place] = labels.at[b, car]
-    named.crosses[row, place] = labels.crosses[b, car]
-    named.lane[row, place] = labels.lane[b, car]
-    named.bits[row, place] = labels.bits[b, car]
+def show(b: int, n: int, row: int, state: State, labels: Labels, own: State, named: Labels) -> None:
+    """Fill row `row` (row) of `own` and `named` with the cars of trial b, car n first."""
+    own.count[row] = state.count[b]
+    for car in range(state.count[b]):
+        place = 0 if car == n else (car + 1 if car < n else car)
+        own.x[row, place] = state.x[b, car]
+        own.y[row, place] = state.y[b, car]
+        own.c[row, place] = state.c[b, car]
+        own.s[row, place] = state.s[b, car]
+        own.speed[row, place] = state.speed[b, car]
+        own.yaw_rate[row, place] = state.yaw_rate[b, car]
+        named.segment[row, place] = labels.segment[b, car]
+        named.at[row, place] = labels.at[b, car]
+        named.crosses[row, place] = labels.crosses[b, car]
+        named.lane[row, place] = labels.lane[b, car]
+        named.bits[row, place] = labels.bits[b, car]
 
 
 class Viewpoints:

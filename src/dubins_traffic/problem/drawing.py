@@ -12,7 +12,7 @@ from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.configuration import PlannedAgent
 from dubins_traffic.problem.cycles import cycle_lanes, draw_cycle
 from dubins_traffic.problem.instance import EAgent
-from dubins_traffic.problem.kinds import FREE, KEEP_RULES, loops
+from dubins_traffic.problem.kinds import KEEP_RULES, loops
 from dubins_traffic.problem.overlap import Shape, obstacle_shape, overlap
 from dubins_traffic.problem.starts import Wish
 from dubins_traffic.roads.network import RoadNetwork
@@ -146,7 +146,7 @@ def agent_wishes(
                 lanes = cycle_lanes(network, agent.parameters["cycle"])
             except InputError as error:
                 raise error.within(field=f"{plan.field}.parameters") from None
-        if agent.kind in KEEP_RULES | {FREE} and clear is not None:
+        if agent.kind in KEEP_RULES and clear is not None:
             lanes = clear if lanes is None else [lane for lane in lanes if lane in clear] or lanes
         wishes.append(Wish(plan.start, lanes, f"{plan.field}.start"))
     return wishes

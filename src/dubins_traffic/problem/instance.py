@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import inf
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Field, model_validator
@@ -20,6 +21,7 @@ from dubins_traffic.problem.preconditions import check_curves
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
 
+FREE = "free"
 NUDGED = "nudged"
 """The kind of e-agent that does what another kind does, delayed and with noise."""
 
@@ -83,7 +85,12 @@ class EAgent:
 
     @property
     def driver(self) -> EAgent:
-        """The e-agent that decides this one's commands: itself, or of a nudged one the kind that it delays."""
+        """The e-agent that decides this one's commands: itself, or of a nudged one the kind that it delays.
+
+        Of a free one that is the law, at top speed: it gives way to it where it must.
+        """
+        if self.kind == FREE:
+            return EAgent("lawful", self.name, self.type, {"goes": "wander", "speed": inf})
         if self.kind != NUDGED:
             return self
         return EAgent(self.parameters["kind"], self.name, self.type, self.parameters["parameters"])

@@ -24,7 +24,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.outside import is_place
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, fault, parse
-from dubins_traffic.problem.instance import NUDGED
+from dubins_traffic.problem.instance import FREE, NUDGED
 
 Speed = Annotated[float, Field(ge=limits.LEAST, le=limits.SPEED)]
 Distance = Annotated[float, Field(ge=0, le=limits.METRES)]
@@ -42,6 +42,7 @@ NetworkPoint = Annotated[
 ]
 """A point of a network's own frame; whole numbers are integers."""
 TimedCommand = Annotated[list[float], Field(min_length=3, max_length=3)]
+Whim = Annotated[list[float], Field(min_length=5, max_length=5)]
 PATIENCE = (
     "seconds it stands for others before it drives on past those not in its way, and turns round if "
     "its way stays barred; null: it stands for ever"
@@ -219,8 +220,15 @@ class Free(Strict):
         max_length=limits.COMMANDS,
         description="[seconds, speed in m/s, yaw rate in rad/s]; none: at random",
     )
+    whims: list[Whim] = Field(
+        default=[],
+        max_length=limits.COMMANDS,
+        description="the same with more to choose, in place of commands: [seconds, share of the law's speed, "
+        "speed in m/s, yaw rate in rad/s, share of E3's time for which it holds at a line]; a first -1: by speed and "
+        "yaw rate, a last -1: drawn",
+    )
     repeat: bool = Field(
-        default=False, description="whether the commands begin again; else the law follows them"
+        default=False, description="whether the commands or whims begin again; else the law follows them"
     )
 
 
@@ -272,7 +280,6 @@ class Remote(Strict):
 
 
 COUNTER = "counter"
-FREE = "free"
 REMOTE = "remote"
 NUDGEABLE: frozenset[str] = frozenset(
     {"wander", "loop", "follow", "parked", "scripted", "lawful", "nemesis", "chosen"}
@@ -297,7 +304,7 @@ KINDS: dict[str, type[Strict]] = {
 """Kinds by name, each with the model of its parameters; `agents.kinds` says how they drive."""
 KEEP_RULES: frozenset[str] = frozenset({"lawful", "nemesis", "chosen"})
 """Kinds of e-agents that keep the rules of the road."""
-ALONE: frozenset[str] = frozenset({COUNTER, FREE, OWN, REMOTE})
+ALONE: frozenset[str] = frozenset({COUNTER, OWN, REMOTE})
 """Kinds of e-agents whose trials are not batched: a driver in Python or in another process decides."""
 
 NAMES_2016: Mapping[str, str] = {"wander/wander": "wander"}

@@ -201,10 +201,11 @@ class Referee:
     def ways(self, state: State) -> npt.NDArray[np.bool_]:
         """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, that of `state`."""
         found = np.zeros(state.x.shape, dtype=np.bool_)
-        find_ways(self._tick, self._seeing(state), found)
+        find_ways(self._tick, self.tables(state), found)
         return found
 
-    def _seeing(self, state: State) -> RefereeTables:
+    def tables(self, state: State) -> RefereeTables:
+        """Return the tables by which the last frame was judged, that of `state`; they must not be changed."""
         if self._tables is None or self._tables.state is not state:
             own = self._labeller
             self._tables = RefereeTables(
@@ -215,7 +216,7 @@ class Referee:
 
     def _judge(self, tick: int, state: State) -> None:
         self._tick = tick
-        self._judge_frame(tick, self._seeing(state))
+        self._judge_frame(tick, self.tables(state))
 
     def _collect(self, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Breach]]:
         if not self._log.filled[0] and not any(contacts):
@@ -254,7 +255,7 @@ class Referee:
         bits = np.zeros(frames.x.shape, dtype=np.uint32)
         breaches: list[Breach] = []
         room = self._log.room_of_a_frame
-        labelling, judging = own.seeing(self._state), self._seeing(self._state)
+        labelling, judging = own.seeing(self._state), self.tables(self._state)
         done = 0
         while done < len(frames):
             done = judge_frames(frames.first, done, room, poses, bits, labelling, judging)

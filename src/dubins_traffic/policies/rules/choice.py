@@ -18,6 +18,8 @@ LATE = 1.0
 """A car that has been in a crossing for this long, seconds, keeps its exit while that is open, even if there may be no
 room behind the cars there: on the way to another exit it might not leave the disc in time."""
 
+COMES = 0.5
+"""Within this distance of a bend, metres, a car is about to enter it."""
 CHOICES = 4
 """A car in a crossing looks for another exit once in this many ticks."""
 
@@ -132,6 +134,26 @@ def turn_elsewhere(b: int, n: int, tick: int, traffic: Traffic) -> None:
         car.waited = 0
 
 
+@jit_rare
+def bars_others(b: int, n: int, traffic: Traffic) -> bool:
+    """Tell whether a car that turned round in its bend now would bar others' ways: of who is in it, or about to enter.
+
+    Who came by the other road is no excuse for them (E4), and the way back no exit for it.
+    """
+    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
+    v = lane_end(roads, net, drivers.car[b, n].lane)
+    corner = roads.vertex[int(roads.vert_off[net]) + v]
+    near = vehicle.disc + vehicle.reach + COMES
+    for j in range(state.count[b]):
+        lane = labels.lane[b, j]
+        dx, dy = state.x[b, j] - corner.x, state.y[b, j] - corner.y
+        comes = lane >= 0 and lane_end(roads, net, int(lane)) == v and dx * dx + dy * dy < near * near
+        if j != n and (comes or labels.crosses[b, j] == v):
+            return True
+    return False
+
+
 @jit_inline
 def keeps_exit(b: int, n: int, tick: int, way: KeptPath, traffic: Traffic) -> bool:
     """Tell whether `find_way_out` is certain to keep the exit of a car in a crossing and only count ticks.
@@ -160,4 +182,7 @@ def find_way_out(b: int, n: int, tick: int, part: int, traffic: Traffic) -> None
         late = car.within > ticks_of(LATE, vehicle)
         if late and is_open(b, n, car.next_lane, traffic):
             return
+    wanted = car.next_lane
     turn_elsewhere(b, n, tick, traffic)
+    if not crossing and car.next_lane == car.lane ^ 1 != wanted and bars_others(b, n, traffic):
+        car.next_lane = wanted

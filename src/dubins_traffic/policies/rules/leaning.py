@@ -53,9 +53,10 @@ def beside_bend(b: int, n: int, traffic: Traffic) -> bool:
 
 @jit_rare
 def away_from(b: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
-    """Return how far left of its way a car keeps clear of the listed bodies left of it, 0 or less, metres.
+    """Return how far left of its way a car keeps clear of the listed bodies beside its lane, 0 or less, metres.
 
-    Its centre stays on the road. `near` (count) cars are listed.
+    Those have their centres left of the centre line; who is ahead or behind in the lane is not passed by leaning. Its
+    centre stays on the road. `near` (count) cars are listed.
     """
     state, scratch, vehicle = traffic.state, traffic.scratch, traffic.drivers.vehicle[b]
     clear = vehicle.half_width + vehicle.rounding + travel_of(vehicle) + GUARD + SIDE
@@ -64,6 +65,6 @@ def away_from(b: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
         j = scratch.near[k]
         _, _, left, px, py = on_way(way, state.x[b, j], state.y[b, j])
         half = half_across(b, j, px, py, state, vehicle)
-        if 0.0 < left < 4.0 * vehicle.middle:
+        if vehicle.middle < left < 4.0 * vehicle.middle:
             offset = min(offset, left - half - clear)
     return max(offset, EDGE - vehicle.middle)
