@@ -23,7 +23,7 @@ test: .venv/.installed-dev ## all checks, then all tests
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal
 
 kernels: .venv/.installed-dev
-	-@$(BIN)/dubins-traffic warm --all
+	-@$(BIN)/dubins-traffic build
 
 tools: .venv/.installed-dev
 	@scripts/system-packages.sh

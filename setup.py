@@ -1,15 +1,25 @@
-"""Writes the commit that a package is built from into it; all else stands in pyproject.toml."""
+"""Writes the commit that a package is built from into it, and into wheels machine code; all else is in pyproject.toml.
 
+Machine code lies in the folder that DUBINS_TRAFFIC_MACHINE names, where `dubins-traffic build --folder` has put it
+(scripts/release.sh). A wheel with it is one for Linux on x86-64, whichever Python; without it, one for every machine.
+"""
+
+import os
+import shutil
 import subprocess
 from pathlib import Path
 
 from setuptools import setup
+from setuptools.command.bdist_wheel import bdist_wheel
 from setuptools.command.build_py import build_py
 from setuptools.command.sdist import sdist
 
 NAME = "commit.txt"
 HERE = Path(__file__).parent
 PACKAGE = Path("src") / "dubins_traffic"
+MACHINE = os.environ.get("DUBINS_TRAFFIC_MACHINE", "")
+SYSTEM = "manylinux_2_17_x86_64"
+"""Where the libraries run: they need nothing of the system but what fills memory."""
 
 
 def commit() -> str:
@@ -26,13 +36,25 @@ def commit() -> str:
 
 
 class WithCommit(build_py):
-    """The modules, and the commit beside them."""
+    """The modules, the commit beside them, and machine code if there is any."""
 
     def run(self) -> None:
         """Build the modules; an editable installation stays as it is."""
         super().run()
-        if not self.editable_mode:
-            (Path(self.build_lib) / "dubins_traffic" / NAME).write_text(commit(), encoding="ascii")
+        if self.editable_mode:
+            return
+        package = Path(self.build_lib) / "dubins_traffic"
+        (package / NAME).write_text(commit(), encoding="ascii")
+        if MACHINE:
+            shutil.copytree(MACHINE, package / "machine", dirs_exist_ok=True)
+
+
+class ForMachine(bdist_wheel):
+    """A wheel, named after the machines that it is for."""
+
+    def get_tag(self) -> tuple[str, str, str]:
+        """Return the tags of the wheel."""
+        return ("py3", "none", SYSTEM) if MACHINE else super().get_tag()
 
 
 class SourcesWithCommit(sdist):
@@ -44,4 +66,4 @@ class SourcesWithCommit(sdist):
         (Path(base_dir) / PACKAGE / NAME).write_text(commit(), encoding="ascii")
 
 
-setup(cmdclass={"build_py": WithCommit, "sdist": SourcesWithCommit})
+setup(cmdclass={"bdist_wheel": ForMachine, "build_py": WithCommit, "sdist": SourcesWithCommit})

@@ -24,7 +24,7 @@ FORMAT = 0
 NAME = "manifest.json"
 CAMPAIGN = "campaign.json"
 OURS = "dubins-traffic"
-LIBRARIES = ("mcap", "numba", "numpy", "pyarrow")
+LIBRARIES = ("mcap", "numpy", "pyarrow")
 
 
 def make(campaign: Campaign, records: str) -> dict[str, Any]:
