@@ -45,8 +45,9 @@ class WithCommit(build_py):
             return
         package = Path(self.build_lib) / "dubins_traffic"
         (package / NAME).write_text(commit(), encoding="ascii")
+        shutil.rmtree(package / "machine", ignore_errors=True)  # of a wheel that was built here before
         if MACHINE:
-            shutil.copytree(MACHINE, package / "machine", dirs_exist_ok=True)
+            shutil.copytree(MACHINE, package / "machine")
 
 
 class ForMachine(bdist_wheel):

@@ -96,7 +96,7 @@ def followed(course: Course, folder: Path) -> None:
 def measure() -> list[Row]:
     """Return the rows of this benchmark."""
     course = Course()
-    with TemporaryDirectory(ignore_cleanup_errors=True) as name:  # a companion still compiles
+    with TemporaryDirectory(ignore_cleanup_errors=True) as name:  # a builder still compiles
         folder = Path(name)
         sources(folder)
         write_template("python", folder / "entry")
