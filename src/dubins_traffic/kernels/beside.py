@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import base64
 import contextlib
-import fcntl
 import json
 import multiprocessing
 import os
@@ -44,7 +43,7 @@ STARTS = 3
 @cache
 def can_build() -> bool:
     """Tell whether kernels can be compiled here: with the extra `compile`, where processes can hand over locks."""
-    return find_spec("numba") is not None
+    return find_spec("numba") is not None and find_spec("fcntl") is not None
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,6 +220,8 @@ def builder(*, behind: bool) -> Builder | None:
     OSError
         If nothing can be kept.
     """
+    import fcntl  # not there on every system on which kernels run interpreted
+
     if _begun and _begun[-1].process == os.getpid() and not _begun[-1].has_ended:
         return _begun[-1]
     while _begun:

@@ -2,7 +2,7 @@
 
 ``python -m dubins_traffic.kernels.builder [--behind]``, which stands back behind all other processes; `kernels.beside`
 begins it and tells it by standard input what is wanted, a line for a kernel. It ends when it has compiled all that it
-was told and whoever began it has ended or has told nothing for some seconds, and after ten minutes in any case.
+was told and whoever began it has ended or has told nothing for a second, and after ten minutes in any case.
 """
 
 from __future__ import annotations
@@ -30,8 +30,8 @@ SESSION = Path("/proc/self/autogroup")
 """Where Linux is told how much the processes of a session stand back behind those of others."""
 HEARD = 2.0
 """Seconds for which it tries to tell Linux so, while others do the same."""
-LINGER = 5.0
-"""Seconds for which it waits for more to do."""
+LINGER = 1.0
+"""Seconds for which it waits for more to do; others may wait for its lock."""
 LONGEST = 600.0
 """Seconds after which it begins nothing more."""
 PAUSE = 0.05

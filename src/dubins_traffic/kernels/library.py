@@ -65,6 +65,8 @@ def find(symbol: str) -> tuple[Kind, int] | None:
 @cache
 def libraries() -> tuple[Library, ...]:
     """Return the library in the package, and the one that the user has built, as far as there are any that fit."""
+    if not levels():
+        return ()
     found = [_best(IN_PACKAGE)]
     own = base_folder() / BUILT
     if os.environ.get(TIER) == KEPT or is_private(own):
