@@ -67,7 +67,7 @@ def moments() -> Iterator[Callable[[], object]]:
     yield partial(list, draw_many(load_config("town"), 0, range(MANY)))
     yield lambda: LanesTogether(pair, "sure").step()
     problem = replace(town.problem, laser=Laser(), formulas=FORMULAS)
-    noise = Disturbances(0.01, 0.01, 1, 0.1)
+    noise = Disturbances(position_noise=0.01, heading_noise=0.01, command_delay=1, command_loss=0.1)
     yield partial(run_trial, replace(town, problem=problem, disturbances=noise), "lanes")
     yield partial(run_trial, replace(town, problem=problem), _Watching())
     yield partial(_checked, town)
