@@ -28,7 +28,7 @@ test-tools: .venv/.installed-dev ## the other tests: with tools, which are insta
 	$(BIN)/python -m pytest -n $(WORKERS) --dist worksteal -m "tools or long"
 
 kernels: .venv/.installed-dev
-	-@$(BIN)/dubins-traffic warm --all
+	-@$(BIN)/dubins-traffic build
 
 tools: .venv/.installed-dev
 	@scripts/system-packages.sh

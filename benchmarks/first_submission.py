@@ -69,7 +69,10 @@ def install(folder: Path, around: Mapping[str, str]) -> None:
     assert (pip, words[0]) == ("pip", "install"), words
     extra = words[1].partition("[")[2].rstrip("]")
     line = [str(folder / "env" / "bin" / "python"), "-m", "pip", "install", "--quiet", "--constraint"]
-    line += ["constraints.txt", f".[{extra}]"]
+    line += [
+        "constraints.txt",
+        f".[{extra},compile]",
+    ]  # these sources have no machine code, which a wheel has
     subprocess.run(line, cwd=folder, env=around, check=True, stderr=subprocess.DEVNULL)
 
 
@@ -93,7 +96,7 @@ def followed(course: Course, folder: Path) -> None:
 def measure() -> list[Row]:
     """Return the rows of this benchmark."""
     course = Course()
-    with TemporaryDirectory(ignore_cleanup_errors=True) as name:  # a companion still compiles
+    with TemporaryDirectory(ignore_cleanup_errors=True) as name:  # a builder still compiles
         folder = Path(name)
         sources(folder)
         write_template("python", folder / "entry")

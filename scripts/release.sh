@@ -1,15 +1,20 @@
 #!/usr/bin/env bash
 # Makes wheel and source distribution in dist/, and tries both, each in an environment of its own, with every Python from 3.11
-# to 3.14 that is found. The same trial must give the same score everywhere.
+# to 3.14 that is found. The wheel holds machine code for each level of processors. The same trial must give the same score
+# everywhere, and take no compiler and 170 MB at most with all that it needs.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 unset PYTHONPATH # what is tried is what is installed
+MOST=170
 root=$PWD
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
 
 rm -rf dist
-.venv/bin/python -m build --outdir dist . >"$work/build.log" 2>&1 || { tail -20 "$work/build.log" >&2; exit 1; }
+for level in x86-64-v2 x86-64-v3 x86-64-v4; do
+  NUMBA_CACHE_DIR="$work/cache" .venv/bin/dubins-traffic build --level "$level" --folder "$work/machine"
+done
+DUBINS_TRAFFIC_MACHINE="$work/machine" .venv/bin/python -m build --outdir dist . >"$work/build.log" 2>&1 || { tail -20 "$work/build.log" >&2; exit 1; }
 wheel=$(echo dist/*.whl)
 sources=$(echo dist/*.tar.gz)
 echo "release: $wheel $sources"
@@ -21,8 +26,12 @@ for name in python3.11 python3.12 python3.13 python3.14; do
     for package in "$wheel" "$sources"; do
       rm -rf "$work/environment"
       "$python" -m venv "$work/environment"
+      empty=$(du -sm "$work/environment/lib" | cut -f1)
       "$work/environment/bin/python" -m pip install --quiet --disable-pip-version-check --constraint constraints.txt "$root/$package"
-      (cd "$work" && "$work/environment/bin/dubins-traffic" run demo --trials 1 --json >"$work/score.json" 2>/dev/null)
+      size=$(($(du -sm "$work/environment/lib" | cut -f1) - empty))
+      [ "$size" -le "$MOST" ] || { echo "release: $package takes $size MB installed, more than $MOST" >&2; exit 1; }
+      (cd "$work" && "$work/environment/bin/dubins-traffic" run demo --trials 1 --json >"$work/score.json" 2>"$work/said")
+      if [ "$package" = "$wheel" ] && grep -q "machine code" "$work/said"; then cat "$work/said" >&2; exit 1; fi
       "$work/environment/bin/python" - "$work" <<'PYTHON'
 import json, sys
 from pathlib import Path

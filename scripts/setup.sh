@@ -37,8 +37,10 @@ if ! .venv/bin/python -m pip --version >/dev/null 2>&1; then
   echo "setup: creating .venv with $("$python" --version)"
   "$python" -m venv --clear .venv
 fi
-echo "setup: installing dubins-traffic[$extra] into .venv"
-.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt --editable ".[$extra]"
+# A clone has no machine code: kernels are compiled here.
+if [ "$extra" != dev ]; then wanted="$extra,compile"; else wanted=dev; fi
+echo "setup: installing dubins-traffic[$wanted] into .venv"
+.venv/bin/python -m pip install --quiet --disable-pip-version-check --no-compile --constraint constraints.txt --editable ".[$wanted]"
 # On all processors, as pip doesn't, where processes can share a lock: a chroot without /dev/shm has none. What nobody here
 # imports, a third of it, is left out, and would be compiled when it is imported.
 # Some packages hold files that are no Python, at which this ends with another status.

@@ -131,8 +131,8 @@ ASKED = (
     Asked("worker http://127.0.0.1:9 --token-file one.json", ("litestar",), ends=False),
 )
 ELSEWHERE = {
-    "competition open", "competition verify", "sandbox check", "gazebo install", "gazebo doctor", "warm",
-    "ros1 run", "lines run", "stdio run",
+    "competition open", "competition verify", "sandbox check", "gazebo install", "gazebo doctor", "build",
+    "warm", "ros1 run", "lines run", "stdio run",
 }  # fmt: skip
 """Commands that go on from what is sealed, wait for somebody, or change the machine."""
 

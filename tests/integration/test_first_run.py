@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.companions import hurry
+from tests.builders import builders
 
 COMMAND = [sys.executable, "-m", "dubins_traffic.cli"]
 RUN = ["run", "mc-small-4grid-agents2", "--controller", "simple", "--seed", "3"]
@@ -29,19 +29,6 @@ def kernels(cache: Path) -> set[str]:
     return {path.name for path in cache.rglob("*.kernel")}
 
 
-def asked(cache: Path) -> set[str]:
-    return {path.name for path in cache.rglob("asked-*/*.json")}
-
-
-def wait_for_companion(cache: Path) -> None:
-    """Wait until all that has been asked for is compiled; a companion ends after ten minutes, done or not."""
-    command = [sys.executable, "-m", "dubins_traffic.kernels.companion"]
-    while asked(cache):
-        hurry(cache)
-        subprocess.run(command, env={**os.environ, "NUMBA_CACHE_DIR": str(cache)}, check=True)
-        assert not [path.read_text() for path in cache.rglob("asked-*/*.failed")]
-
-
 @pytest.fixture(scope="module")
 def first(tmp_path_factory) -> tuple[Path, bytes, str]:
     """Return a cache that a first run has begun, what it recorded, and what it said."""
@@ -52,12 +39,12 @@ def first(tmp_path_factory) -> tuple[Path, bytes, str]:
 def test_a_first_run_is_interpreted_and_says_so_in_one_line(first) -> None:
     cache, _, said = first
     assert said.count("dubins-traffic: ") == said.count(BESIDE) == 1
-    assert asked(cache) | kernels(cache)
+    assert builders(cache) or kernels(cache)
 
 
 def test_later_runs_give_the_same_bytes_and_compile_nothing(first, tmp_path) -> None:
     cache, recorded, _ = first
-    wait_for_companion(cache)
+    assert run(cache, tmp_path / "waiting", "compiled")[0] == recorded
     made = kernels(cache)
     assert len(made) >= 6
     for tier in ("auto", "compiled", "interpreted"):
@@ -65,5 +52,5 @@ def test_later_runs_give_the_same_bytes_and_compile_nothing(first, tmp_path) -> 
         assert again == recorded
         assert "dubins-traffic: " not in said
     assert kernels(cache) == made
-    assert not asked(cache)
+    assert not list(cache.rglob("*.failed"))
     assert not list(cache.rglob("*.tmp*"))

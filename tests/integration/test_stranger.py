@@ -42,7 +42,7 @@ def installed(folder: Path) -> dict[str, str]:
     programs = folder / "environment" / "bin"
     pip = [sys.executable, "-m", "pip", "--python", programs / "python", "install", "--quiet", "--no-compile"]
     pip += ["--constraint", ROOT / "constraints.txt"]
-    done([*pip, f"{wheel}[campaign,pandas]"], folder, around)
+    done([*pip, f"{wheel}[campaign,compile,pandas]"], folder, around)
     return around | {"PATH": f"{programs}{os.pathsep}{around['PATH']}"}
 
 
@@ -50,7 +50,7 @@ def installed(folder: Path) -> dict[str, str]:
 def test_the_first_page_leads_there() -> None:
     """It installs what `installed` does, and links to each step; the last one names its program."""
     page = (ROOT / "website" / "index.md").read_text(encoding="utf-8")
-    assert "\npip install '.[campaign,pandas]'\n" in page
+    assert "\npip install '.[campaign,compile,pandas]'\n" in page
     places = [page.index(f"(tutorials/{name}.md)") for name in STEPS] + [
         page.index("(foreign-strategies.md)")
     ]

@@ -7,8 +7,8 @@ import pytest
 
 from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.engine.batch_kernel import run_trials
-from dubins_traffic.kernels import asking, store
-from dubins_traffic.kernels.compile import Kernel, rehearsal
+from dubins_traffic.kernels import beside, compile, library, store
+from dubins_traffic.kernels.compile import Kernel
 from dubins_traffic.kernels.machine import Code
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.runs.single import run_trial
@@ -23,7 +23,7 @@ class Switches:
     def __init__(self, monkeypatch, looks: int) -> None:
         self.seen: list[Kernel] = []
         self._looks = looks
-        sought, there = Kernel._sought, asking.Waiting.is_there
+        sought, there = Kernel._sought, beside.Waiting.is_there
         missed: set[tuple] = set()
         left: dict[int, int] = {}
 
@@ -33,6 +33,7 @@ class Switches:
                 self.seen.append(kernel)
                 with monkeypatch.context() as patch:
                     patch.setattr(store, "load", lambda _path: None)
+                    patch.setattr(library, "find", lambda _symbol: None)
                     return sought(kernel, kinds)
             return sought(kernel, kinds)
 
@@ -43,9 +44,10 @@ class Switches:
         for kernel in [own for own in gc.get_objects() if type(own) is Kernel]:
             monkeypatch.setattr(kernel, "_known", {})
             monkeypatch.setattr(kernel, "is_quick", False)
-        monkeypatch.setattr(asking, "PAUSE", 0.0)
+        monkeypatch.setattr(beside, "PAUSE", 0.0)
+        monkeypatch.setattr(compile, "waits", lambda: False)
         monkeypatch.setattr(Kernel, "_sought", seek)
-        monkeypatch.setattr(asking.Waiting, "is_there", look)
+        monkeypatch.setattr(beside.Waiting, "is_there", look)
 
     def gone_over(self) -> list[Kernel]:
         return [own for own in self.seen if any(isinstance(found, Code) for found in own._known.values())]
@@ -55,8 +57,7 @@ class Switches:
 def test_a_batch_that_goes_over_on_its_way_gives_the_same(monkeypatch, looks) -> None:
     plain = run_batch(a_minute("town"), trials=TRIALS, seed=5, batch=4)
     switches = Switches(monkeypatch, looks)
-    with rehearsal():
-        mixed = run_batch(a_minute("town"), trials=TRIALS, seed=5, batch=4)
+    mixed = run_batch(a_minute("town"), trials=TRIALS, seed=5, batch=4)
     assert mixed.sheet.asdict() == plain.sheet.asdict()
     assert [own.ending for own in mixed.outcomes] == [own.ending for own in plain.outcomes]
     assert run_trials in switches.gone_over()
@@ -70,7 +71,6 @@ def test_a_trial_that_goes_over_on_its_way_records_the_same(
     instance = draw(a_minute("town"), 2, 1)
     run_trial(instance, controller, record=tmp_path / "plain.mcap")
     switches = Switches(monkeypatch, looks)
-    with rehearsal():
-        run_trial(instance, controller, record=tmp_path / "mixed.mcap")
+    run_trial(instance, controller, record=tmp_path / "mixed.mcap")
     assert (tmp_path / "mixed.mcap").read_bytes() == (tmp_path / "plain.mcap").read_bytes()
     assert len(switches.gone_over()) >= 5

@@ -45,6 +45,26 @@ def test_a_box_loads_what_it_drives_with_and_tells_its_processor_time(tmp_path: 
     assert result.ending.end == End.DURATION
 
 
+def test_a_box_reads_the_users_machine_code_and_cannot_write_it(tmp_path: Path, monkeypatch) -> None:
+    library = tmp_path / "kernels" / "library"
+    library.mkdir(parents=True)
+    (library / "mine.so").write_text("machine code")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "kernels"))
+    body = (
+        "place = os.environ['NUMBA_CACHE_DIR'] + '/library'\n"
+        "print(open(place + '/mine.so').read())\n"
+        "for name in ('mine.so', 'x86-64-v2.json'):\n"
+        "    try:\n        print(open(place + '/' + name, 'a'))\n"
+        "    except OSError as error:\n        print(type(error).__name__)\n"
+        "return 0.1, 0.0"
+    )
+    result, controller = driven(written(tmp_path, body), ticks=1)
+    assert result.ending.end == End.DURATION
+    assert controller.log_tail.split("\n")[0] == "machine code"
+    assert set(controller.log_tail.split("\n")[1:3]) <= {"OSError", "PermissionError"}
+    assert [path.name for path in library.iterdir()] == ["mine.so"]
+
+
 REPORTING = """
 class Mine:
     def start(self, problem): pass

@@ -53,7 +53,7 @@ from dubins_traffic.kernels import compile as making
 from dubins_traffic.kernels.compiler import Compiler
 from dubins_traffic.kernels.kinds import kind_of
 compiler = Compiler()
-making.companion = compiler.jit
+making.builder = compiler.jit
 from tests.unit import test_ahead
 seats = kind_of(test_ahead.table(test_ahead.Seat, 1))
 kinds = ("array", "i8", 1, "C", True), seats, ("array", "f8", 3, "C", True)

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from pyarrow import parquet
 
@@ -207,3 +208,8 @@ def test_a_controller_that_is_missing_in_the_manifest(short: Campaign, tmp_path:
     twice = {**known, "controllers": [*known["controllers"], *known["controllers"]]}
     with pytest.raises(InputError, match="controllers: other controllers"):
         manifest.stored_campaign(tmp_path / "out", twice)
+
+
+def test_versions_are_those_of_the_libraries_that_are_installed(monkeypatch) -> None:
+    monkeypatch.setattr(manifest, "LIBRARIES", ("numpy", "no-such-library"))
+    assert manifest._versions() == {"numpy": np.__version__}

@@ -37,7 +37,7 @@ import sys
 from dubins_traffic.kernels import compile as making
 from dubins_traffic.kernels.compiler import Compiler
 compiler = Compiler()
-making.companion = compiler.jit
+making.builder = compiler.jit
 import judging
 kinds = ("number", "i8"), ("array", "i8", 1, "C", True)
 code, answer = compiler.machine_code(judging.judge, kinds, "judge")

@@ -33,7 +33,7 @@ class Watched(Compiler):
                 print("go_round" in own.name, "cold" in said)
 
 compiler = Watched()
-making.companion = compiler.jit
+making.builder = compiler.jit
 import driving
 compiler.machine_code(driving.drive, (("array", "f8", 1, "C", True),), "drive")
 """

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from dubins_traffic.kernels.sources import KEEPERS, MAKERS, PACKAGE, imported
-from dubins_traffic.kernels.store import SUFFIX, kernel_file, load, save
+from dubins_traffic.kernels.store import SUFFIX, kernel_file, key_of, load, save
 
 CALL = "from dubins_traffic.kernels.trig import sincos; print(sincos(0.5))"
 
@@ -83,7 +83,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path) -> None:
 def test_kinds_and_processor_name_a_kernels_file() -> None:
     file = PACKAGE / "kernels" / "trig.py"
     paths = {
-        kernel_file(file, name, kinds, processor)
+        kernel_file(key_of(file, name, kinds), processor)
         for name in ("a", "b")
         for kinds in ((), (("number", "f8"),), (("number", "i8"),))
         for processor in (("x86", "one"), ("x86", "two"))

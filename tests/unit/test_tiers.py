@@ -1,6 +1,6 @@
-"""Kernels interpreted and compiled: the companion, its lock, and going over from one to the other."""
+"""Kernels interpreted and compiled: the builder, its lock, and going over from one to the other."""
 
-import json
+import fcntl
 import os
 import shutil
 import signal
@@ -16,7 +16,7 @@ import pytest
 
 import dubins_traffic
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels import asking, companion, compile, store
+from dubins_traffic.kernels import beside, builder, compile
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import Kernel, jit
@@ -26,7 +26,7 @@ from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import arc_factors, sincos
 from dubins_traffic.trial.buffer import all_finite
-from tests.companions import companions, hurry
+from tests.builders import builders, hurry
 
 PATIENCE = 600.0
 
@@ -57,11 +57,11 @@ def finished(process: subprocess.Popen[str]) -> tuple[str, str]:
             process.kill()
 
 
-def end_companions(cache: Path) -> None:
-    for process in companions(cache):
+def end_builders(cache: Path) -> None:
+    for process in builders(cache):
         with suppress(ProcessLookupError):
             os.kill(process, signal.SIGKILL)
-    until(lambda: not companions(cache))
+    until(lambda: not builders(cache))
 
 
 def until(fact) -> None:
@@ -76,14 +76,10 @@ def kernels(cache: Path) -> list[Path]:
     return sorted(cache.rglob("*.kernel"))
 
 
-def asked(cache: Path) -> list[Path]:
-    return sorted(cache.rglob(f"{asking.ASKED}-*/*.json"))
-
-
 @pytest.fixture
 def cache(tmp_path):
     yield tmp_path / "cache"
-    end_companions(tmp_path / "cache")
+    end_builders(tmp_path / "cache")
 
 
 SWITCH = """
@@ -94,7 +90,7 @@ from time import sleep
 answers = set()
 while not any(isinstance(found, Code) for found in sincos._known.values()):
     answers.add(sincos(0.5))
-    sleep(0.001)  # for the companion, which nobody waits for
+    sleep(0.001)  # for the builder, which nobody waits for
 answers.add(sincos(0.5))
 print(answers, "numba" in __import__("sys").modules)
 """
@@ -114,68 +110,67 @@ def test_calls_go_over_to_machine_code_when_it_is_there(cache) -> None:
 CALL = "from dubins_traffic.kernels.trig import sincos; print(sincos(0.5))"
 
 
-def test_what_a_killed_companion_was_asked_for_is_compiled_by_the_next(cache) -> None:
+def test_what_a_killed_builder_was_told_is_compiled_by_the_next(cache) -> None:
     python(cache, CALL)
-    until(lambda: companions(cache) or kernels(cache))
-    end_companions(cache)
+    until(lambda: builders(cache) or kernels(cache))
+    end_builders(cache)
     for path in kernels(cache):
         path.unlink()  # as if it had been killed earlier
     assert python(cache, CALL, "compiled") == (f"{sincos(0.5)}\n", "")
     assert len(kernels(cache)) == 1
-    until(lambda: not asked(cache))
 
 
-def test_a_companion_killed_while_it_is_waited_for_is_begun_again(cache) -> None:
+def test_a_builder_killed_while_it_is_waited_for_is_begun_again(cache) -> None:
     waiting = begin(cache, CALL, "compiled")
-    until(lambda: companions(cache) or waiting.poll() is not None)
-    end_companions(cache)
+    until(lambda: builders(cache) or waiting.poll() is not None)
+    end_builders(cache)
     assert finished(waiting) == (f"{sincos(0.5)}\n", "")
 
 
-def test_a_companion_for_which_nobody_waits_leaves_processors_to_all_others(cache) -> None:
+def test_a_builder_for_which_nobody_waits_leaves_processors_to_all_others(cache) -> None:
     assert python(cache, CALL)[0]
-    until(lambda: companions(cache))
-    until(lambda: [os.sched_getscheduler(process) for process in companions(cache)] in ([], [os.SCHED_IDLE]))
-    for process in companions(cache):
+    until(lambda: builders(cache))
+    until(lambda: [os.sched_getscheduler(process) for process in builders(cache)] in ([], [os.SCHED_IDLE]))
+    for process in builders(cache):
         session = Path(f"/proc/{process}/autogroup")
-        assert os.getpriority(os.PRIO_PROCESS, process) == companion.NICE
-        assert not session.exists() or f"nice {companion.NICE}" in session.read_text()
-    end_companions(cache)
+        assert os.getpriority(os.PRIO_PROCESS, process) == builder.NICE
+        assert not session.exists() or f"nice {builder.NICE}" in session.read_text()
+    end_builders(cache)
     waiting = begin(cache, CALL, "compiled")
-    until(lambda: companions(cache))
-    assert [os.sched_getscheduler(process) for process in companions(cache)] == [os.SCHED_OTHER]
+    until(lambda: builders(cache))
+    assert [os.sched_getscheduler(process) for process in builders(cache)] == [os.SCHED_OTHER]
     finished(waiting)
 
 
 HEARD_LATER = """
 import ctypes, os
 from contextlib import suppress
-from dubins_traffic.kernels import companion
+from dubins_traffic.kernels import builder
 os.setsid()
 if os.getuid() == 0:
     os.setgid(65534)
     os.setuid(65534)
     ctypes.CDLL(None).prctl(4, 1)  # PR_SET_DUMPABLE: who gave up root may write to his own /proc again
 with suppress(BlockingIOError):
-    companion.SESSION.write_bytes(b"0")  # Linux hears ordinary users once in a tenth of a second: the next has to wait
-companion._stand_back_as_session()
-print(companion.SESSION.read_bytes().split()[-1].decode())
+    builder.SESSION.write_bytes(b"0")  # Linux hears ordinary users once in a tenth of a second: the next has to wait
+builder._stand_back_as_session()
+print(builder.SESSION.read_bytes().split()[-1].decode())
 """
 
 
 @pytest.mark.skipif(
-    not companion.SESSION.exists(), reason="this Linux does not share processors among sessions"
+    not builder.SESSION.exists(), reason="this Linux does not share processors among sessions"
 )
-def test_a_companion_stands_back_though_linux_hears_it_only_later(cache) -> None:
-    assert python(cache, HEARD_LATER) == (f"{companion.NICE}\n", "")
+def test_a_builder_stands_back_though_linux_hears_it_only_later(cache) -> None:
+    assert python(cache, HEARD_LATER) == (f"{builder.NICE}\n", "")
 
 
-def test_processes_at_once_have_one_companion(cache) -> None:
+def test_processes_at_once_have_one_builder(cache) -> None:
     several = [begin(cache, CALL, "compiled") for _ in range(4)]
     assert [finished(process)[0] for process in several] == [f"{sincos(0.5)}\n"] * 4
     times = [path.stat().st_mtime_ns for path in kernels(cache)]
     assert len(times) == 1
-    until(lambda: len(companions(cache)) <= 1)
+    until(lambda: len(builders(cache)) <= 1)
 
 
 def test_the_same_version_elsewhere_compiles_nothing(cache, tmp_path, monkeypatch) -> None:
@@ -186,12 +181,10 @@ def test_the_same_version_elsewhere_compiles_nothing(cache, tmp_path, monkeypatc
     monkeypatch.setenv("PYTHONPATH", str(tmp_path / "src"))
     assert python(cache, CALL, "auto") == there  # and does not say that anything is compiled
     assert {path: path.stat().st_mtime_ns for path in kernels(cache)} == made
-    assert not list(cache.rglob("asked-*/*.json"))
 
 
 def test_two_installations_with_other_sources_share_a_cache(cache, tmp_path, monkeypatch) -> None:
     python(cache, CALL, "compiled")
-    assert companions(cache)
     package = Path(dubins_traffic.__file__).parent
     shutil.copytree(package, tmp_path / "src" / package.name, ignore=shutil.ignore_patterns("__pycache__"))
     source = tmp_path / "src" / package.name / "kernels" / "trig.py"
@@ -201,33 +194,33 @@ def test_two_installations_with_other_sources_share_a_cache(cache, tmp_path, mon
     assert python(cache, code, "compiled") == (f"{-arc_factors(0.5)[1]}\n", "")
 
 
-def test_one_companion_alone_holds_the_lock(cache, monkeypatch) -> None:
-    monkeypatch.setattr(store, "cache_folder", lambda: cache)
-    cache.mkdir()
-    with asking.locked() as first, asking.locked() as second:
-        assert (first, second) == (True, False)
-        command = [sys.executable, "-m", "dubins_traffic.kernels.companion"]
-        assert (
-            subprocess.run(command, env=environment(cache, "auto"), check=False, timeout=PATIENCE).returncode
-            == 0
-        )
-    with asking.locked() as free:
-        assert free
-
-
-def test_a_companion_takes_no_notice_of_notes_it_cannot_use(cache) -> None:
+def test_one_builder_alone_holds_the_lock(cache) -> None:
     python(cache, CALL, "compiled")
-    end_companions(cache)
-    kernel = kernels(cache)[0]
-    (folder,) = kernel.parents[1].glob(f"{asking.ASKED}-*")
-    (folder / "torn.json").write_text('{"module": "dub')
-    (folder / "other.json").write_text('["of", "another", "version"]')
-    note = {"module": "dubins_traffic.kernels.trig", "name": "sincos", "file": "/gone", "kinds": "()"}
-    (folder / "gone.json").write_text(json.dumps({**note, "target": str(kernel.with_name("x.kernel"))}))
+    (lock,) = cache.rglob(beside.LOCK)
+    for path in kernels(cache):
+        path.unlink()
+    with lock.open("r+b") as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        waiting = begin(cache, CALL, "compiled")
+        sleep(1.0)
+        assert (waiting.poll(), builders(cache), kernels(cache)) == (None, [], [])
+    assert finished(waiting) == (f"{sincos(0.5)}\n", "")
+
+
+def test_a_builder_takes_no_notice_of_lines_it_cannot_use(cache) -> None:
+    python(cache, CALL, "compiled")
+    (kernel,) = kernels(cache)
     kernel.unlink()
+    wish = beside.Wish(
+        "dubins_traffic.kernels.trig", "sincos", "/gone", "()", str(kernel.with_name("x.kernel"))
+    )
+    lines = wish.line()[:-9] + b"\n" + b"[]\n" + wish.line()
+    command = [sys.executable, "-m", "dubins_traffic.kernels.builder"]
+    around = environment(cache, "auto")
+    assert subprocess.run(command, input=lines, env=around, check=False, timeout=PATIENCE).returncode == 0
+    assert "is another" in wish.failure.read_text() or "/gone" in wish.failure.read_text()
     python(cache, CALL, "compiled")
     assert kernels(cache) == [kernel]
-    until(lambda: not asked(cache))
 
 
 INTERRUPTED = """
@@ -246,7 +239,7 @@ except KeyboardInterrupt:
 def test_waiting_can_be_interrupted_and_what_is_compiled_is_kept(cache) -> None:
     told, _ = python(cache, INTERRUPTED, "compiled")
     assert told.endswith("interrupted\n")
-    until(lambda: hurry(cache) or (kernels(cache) and not asked(cache)))
+    until(lambda: hurry(cache) or kernels(cache))
 
 
 @pytest.mark.parametrize("tier", ["auto", "compiled"])
@@ -256,7 +249,7 @@ def test_where_nothing_can_be_kept_kernels_run_interpreted(tmp_path, tier) -> No
         "store.cache_folder = lambda: pathlib.Path('/proc/nowhere')\n" + CALL
     )
     assert python(tmp_path, code, tier)[0] == f"{sincos(0.5)}\n"
-    assert not companions(tmp_path)
+    assert not builders(tmp_path)
 
 
 def test_kernels_that_are_never_compiled_are_plain_functions(tmp_path) -> None:

@@ -6,8 +6,9 @@ import hashlib
 import json
 import platform
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import asdict
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any, Literal, cast
 
@@ -97,10 +98,19 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
         "versions": {
             OURS: package_version(),
             "python": platform.python_version(),
-            **{name: version(name) for name in LIBRARIES},
+            **_versions(),
         },
         "code": sources_hash(),
     }
+
+
+def _versions() -> dict[str, str]:
+    """Return the versions of the libraries that are installed; machine code is there without Numba, too."""
+    found: dict[str, str] = {}
+    for name in LIBRARIES:
+        with suppress(PackageNotFoundError):
+            found[name] = version(name)
+    return found
 
 
 def write(folder: Path, campaign: Campaign, manifest: Mapping[str, Any]) -> None:

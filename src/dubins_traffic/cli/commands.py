@@ -8,6 +8,7 @@ import typer
 
 from dubins_traffic.cli import (
     batch,
+    build,
     campaign,
     check,
     check_controller,
@@ -35,7 +36,6 @@ from dubins_traffic.cli import (
     synth,
     template,
     verify,
-    warm,
     worker,
 )
 from dubins_traffic.sessions.registry import TRANSPORTS
@@ -111,5 +111,6 @@ app.command("logs", epilog=submit.LOGS_EXAMPLES)(submit.logs)
 app.command("cancel", epilog=submit.CANCEL_EXAMPLES)(submit.cancel)
 app.command("serve", epilog=serve.EXAMPLES)(serve.serve)
 app.command("worker", epilog=worker.EXAMPLES)(worker.worker)
-app.command("warm", epilog=warm.EXAMPLES)(warm.warm)
+app.command("build", epilog=build.EXAMPLES)(build.build)
+app.command("warm", epilog=build.WARM_EXAMPLES, deprecated=True)(build.warm)
 app.command("list", epilog=listing.EXAMPLES)(listing.listing)

@@ -1,30 +1,31 @@
 """Kernels: functions that run interpreted until their machine code is there, with the same bits.
 
-A function that `jit` has taken runs as it is while its machine code is not in the cache; a companion compiles it
-beside, and a later call goes over to machine code. `DUBINS_TRAFFIC_KERNELS` says ``auto`` for that, ``compiled`` for
-waiting until it is there, ``interpreted`` for never compiling, as ``NUMBA_DISABLE_JIT=1`` does. A kernel looks into
-what is kept from tick to tick by a `jit_look`; with `DUBINS_TRAFFIC_CACHES` set to ``off`` nothing is kept.
+A function that `jit` has taken is called as machine code if a library holds it (`kernels.library`). If none does, it
+runs as it is while a builder compiles it beside, and a later call goes over to machine code.
+`DUBINS_TRAFFIC_KERNELS` says ``auto`` for that, ``compiled`` for waiting until machine code is there, ``interpreted``
+for never compiling, as ``NUMBA_DISABLE_JIT=1`` does. A kernel looks into what is kept from tick to tick by a
+`jit_look`; with `DUBINS_TRAFFIC_CACHES` set to ``off`` nothing is kept.
 """
 
 from __future__ import annotations
 
 import inspect
 import os
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from functools import cached_property, update_wrapper
 from pathlib import Path
 from time import monotonic
 from types import FunctionType
-from typing import Any, Generic, ParamSpec, Protocol, TypeVar, cast
+from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels import asking, machine, store
+from dubins_traffic.kernels import beside, library, machine, store
+from dubins_traffic.kernels.folders import KEPT, TIER
 from dubins_traffic.kernels.kinds import Kind, UnfitError, kind_of
 from dubins_traffic.kernels.machine import Code
-from dubins_traffic.kernels.store import KEPT, TIER
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -37,18 +38,22 @@ BESIDE = (
     "kernels are being compiled in the background; until they are there, trials run interpreted, slower and with "
     "the same results"
 )
+NO_COMPILER = (
+    "there is no machine code for some kernels, which run interpreted, slower and with the same results; "
+    "pip install 'dubins-traffic[compile]' compiles them"
+)
 
 
 class Maker(Protocol):
-    """How the companion makes a kernel."""
+    """How the builder makes a kernel."""
 
     def __call__(self, function: Callable[..., Any], *, inlined: bool, wide: bool, rare: bool) -> Any:
         """Return what can be compiled."""
         ...
 
 
-companion: Maker | None = None
-"""Set in the companion alone, which compiles."""
+builder: Maker | None = None
+"""Set in the builder alone, which compiles."""
 
 
 def jit(function: Callable[P, R]) -> Callable[P, R]:
@@ -107,8 +112,8 @@ def _made(
     patient: bool = False,
     rare: bool = False,
 ) -> Callable[P, R]:
-    if companion is not None:
-        return companion(function, inlined=inlined, wide=wide, rare=rare)
+    if builder is not None:
+        return builder(function, inlined=inlined, wide=wide, rare=rare)
     if never_compiled():
         return function
     return Kernel(function, patient=patient)
@@ -152,17 +157,25 @@ def _tier() -> str:
     return tier
 
 
+class Entry(NamedTuple):
+    """A kernel that Python calls, with the kinds of its arguments."""
+
+    kernel: Kernel[..., Any]
+    kinds: tuple[Kind, ...]
+
+
 @contextmanager
-def rehearsal() -> Generator[None]:
-    """Ask for all kernels that are called in the body, and run them interpreted."""
-    _rehearsing.append(None)
+def listed() -> Generator[list[Entry]]:
+    """Run kernels interpreted in the body; the list that is yielded has all that are called, once for each kinds."""
+    entries: list[Entry] = []
+    _listing.append(entries)
     try:
-        yield
+        yield entries
     finally:
-        _rehearsing.pop()
+        _listing.pop()
 
 
-_rehearsing: list[None] = []
+_listing: list[list[Entry]] = []
 
 
 class Kernel(Generic[P, R]):
@@ -187,7 +200,7 @@ class Kernel(Generic[P, R]):
         self._patient = patient
         self._pause = 0.0
         self._function = cast(FunctionType, function)
-        self._known: dict[tuple[Kind, ...], Code | asking.Waiting | None] = {}
+        self._known: dict[tuple[Kind, ...], Code | beside.Waiting | None] = {}
 
     def __call__(self, *args: P.args, **named: P.kwargs) -> R:
         """Run the kernel."""
@@ -225,36 +238,67 @@ class Kernel(Generic[P, R]):
 
     def code(self, kinds: tuple[Kind, ...]) -> Code | None:
         """Return the machine code for arguments of some kinds; None while there is none, and then see to it."""
+        if _listing:
+            if Entry(self, kinds) not in _listing[-1]:
+                _listing[-1].append(Entry(self, kinds))
+            return None
         try:
             found = self._known[kinds]
         except KeyError:
             found = self._known[kinds] = self._sought(kinds)
-        if isinstance(found, asking.Waiting):
-            if found.wait() if not _rehearsing and (self._patient or waits()) else found.is_there():
+        if isinstance(found, beside.Waiting):
+            if found.wait() if self._patient or waits() else found.is_there():
                 found = self._known[kinds] = self._sought(kinds)
             elif found.failure:
-                asking.say(f"{self._function.__name__} stays interpreted: {found.failure.splitlines()[-1]}")
+                beside.say(f"{self._function.__name__} stays interpreted: {found.failure.splitlines()[-1]}")
                 found = self._known[kinds] = None
             else:
-                self._pause = monotonic() + asking.PAUSE
+                self._pause = monotonic() + beside.PAUSE
         return found if isinstance(found, Code) else None
 
-    def _sought(self, kinds: tuple[Kind, ...]) -> Code | asking.Waiting | None:
-        own = self._function
-        file = Path(own.__code__.co_filename)
-        if own.__module__ == "__main__" or "<locals>" in own.__qualname__ or not file.is_file():
+    def _sought(self, kinds: tuple[Kind, ...]) -> Code | beside.Waiting | None:
+        if not self.has_source:
             return None
-        path = store.kernel_file(file, own.__qualname__, kinds, machine.processor())
+        symbol = store.symbol(self.key(kinds))
+        held = library.find(symbol)
+        if held is not None:
+            self.is_quick = True
+            return Code(kinds, *held)
+        if not beside.can_build():
+            if os.environ.get(TIER) != KEPT:
+                beside.say(NO_COMPILER)
+            return None
+        path = store.kernel_file(self.key(kinds), machine.processor())
         found = store.load(path)
         if found is not None:
             self.is_quick = True
-            return Code(kinds, found[0], machine.load(found[1], store.symbol(path)))
+            return Code(kinds, found[0], machine.load(found[1], symbol))
         if os.environ.get(TIER) == KEPT:
             return None
-        waiting = self._patient or waits() or bool(_rehearsing)
+        waiting = self._patient or waits()
         if not waiting:
-            asking.say(BESIDE)
-        return asking.Waiting(own.__module__, own.__qualname__, file, kinds, path, waits=waiting)
+            beside.say(BESIDE)
+        return self.waiting(kinds, path, waits=waiting)
+
+    @property
+    def has_source(self) -> bool:
+        """Whether a builder finds the function in a file."""
+        own = self._function
+        return (
+            own.__module__ != "__main__"
+            and "<locals>" not in own.__qualname__
+            and Path(own.__code__.co_filename).is_file()
+        )
+
+    def key(self, kinds: Sequence[Kind]) -> str:
+        """Return what names the machine code for arguments of some kinds (`kernels.store.key_of`)."""
+        return store.key_of(Path(self._function.__code__.co_filename), self._function.__qualname__, kinds)
+
+    def waiting(self, kinds: Sequence[Kind], path: Path, *, waits: bool) -> beside.Waiting:
+        """Tell a builder that machine code is wanted, in the file `path`."""
+        own = self._function
+        file = Path(own.__code__.co_filename)
+        return beside.Waiting(own.__module__, own.__qualname__, file, kinds, path, waits=waits)
 
     def _whole(self, args: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, ...]:
         """Return all arguments in order, those that take any number of them as one tuple."""

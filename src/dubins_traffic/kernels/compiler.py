@@ -1,4 +1,4 @@
-"""The compiler: from a kernel and the kinds of its arguments to machine code. Only the companion imports it.
+"""The compiler: from a kernel and the kinds of its arguments to machine code. Only the builder imports it.
 
 Numba compiles each function to a library of its own, links into it all that it calls, optimises that, makes machine
 code of it, and then the same again for every function that calls it. Here functions are left as they are, until an
@@ -11,7 +11,7 @@ Nor is there code that unpacks Python's arguments one by one: an entry reads num
 Numba's front end, typing and writing LLVM's language, takes most of the time: `kernels.pipeline` has fewer steps,
 `kernels.frontend` finds things once, `kernels.elements` writes less.
 
-This rests on inner parts of Numba (`docs/design/015-two-tiers.md`); it is the companion's process alone that they are
+This rests on inner parts of Numba (`docs/design/015-two-tiers.md`); it is the builder's process alone that they are
 changed in.
 """
 
@@ -82,6 +82,7 @@ class Compiler:
         self._codegen = self._context.codegen()
         self._codegen._library_class = Library
         self._codegen.set_env = _leave
+        self._machine = _position_independent(self._codegen)
         self._rare: list[Any] = []
         index_plainly()
         shorten()
@@ -135,7 +136,7 @@ class Compiler:
         finally:
             _config.SLP_VECTORIZE = usual
         _check(program)
-        return self._codegen._tm.emit_object(program), returned
+        return self._machine.emit_object(program), returned
 
     def _set_apart(self, program: Any) -> None:
         """Say of the functions of a program that are rarely called that they are: they are put into no other one."""
@@ -168,6 +169,15 @@ class Compiler:
             builder.store(leaf, builder.gep(target, [word(k)]))
         builder.ret(_ir.IntType(32)(0))
         return module
+
+
+def _position_independent(usual: Any) -> Any:
+    """Return what writes machine code that can stand anywhere, as that of libraries must, else as `usual` does."""
+    target = _llvm.Target.from_triple(_llvm.get_process_triple())
+    return target.create_target_machine(
+        cpu=usual._get_host_cpu_name(), features=usual._get_host_cpu_features(), opt=3, reloc="pic",
+        codemodel="default",
+    )  # fmt: skip
 
 
 class _Reader:

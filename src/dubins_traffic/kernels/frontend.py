@@ -1,6 +1,6 @@
 """Numba's front end without what it does again and again: the same machine code, in less time.
 
-Each function here changes one inner part of Numba, in the companion's process alone. What they leave out is looking up
+Each function here changes one inner part of Numba, in the builder's process alone. What they leave out is looking up
 what has been found before, and telling of events to which nobody listens.
 """
 
@@ -58,7 +58,7 @@ class _Nothing:
 
 
 def _tell_nobody() -> None:
-    """Say nothing about passes, locks and places in the source; the companion has one thread that compiles."""
+    """Say nothing about passes, locks and places in the source; the builder has one thread that compiles."""
     nothing = _Nothing()
     _event.start_event = _event.end_event = lambda *_, **__: None  # pyright: ignore[reportUnknownLambdaType]
     _ffi._lib_fn_wrapper.__call__ = _call

@@ -1,9 +1,8 @@
-"""Machine code: compiled kernels are loaded into this process and called. Numba is not needed for that."""
+"""Machine code: kernels are called, and those that no library holds are loaded into this process by llvmlite."""
 
 from __future__ import annotations
 
 import ctypes
-import os
 import struct
 from collections.abc import Iterator, Sequence
 from functools import cache
@@ -11,10 +10,8 @@ from importlib import import_module
 from threading import Lock
 from typing import Any, cast
 
+from dubins_traffic.kernels import levels
 from dubins_traffic.kernels.kinds import NONE, Kind, is_number, is_place, letters, packed, place_of
-
-CPU = "NUMBA_CPU_NAME", "NUMBA_CPU_FEATURES"
-"""Environment variables by which Numba is told for which processor it compiles."""
 
 
 class Loader:
@@ -53,12 +50,35 @@ def load(code: bytes, symbol: str) -> int:
 
 @cache
 def processor() -> tuple[str, ...]:
-    """Return for which processor code is made: its name and what it can do."""
+    """Return for which processor machine code is loaded: the best level that runs here, or `this_processor`.
+
+    Raises
+    ------
+    InputError
+        If the environment names no level.
+    """
+    return levels.levels()[:1] or this_processor()
+
+
+@cache
+def target() -> tuple[str, ...]:
+    """Return for which processor is compiled: that of `processor`, unless the environment names another level.
+
+    Raises
+    ------
+    InputError
+        If the environment names no level.
+    """
+    level = levels.level()
+    return (level,) if level else this_processor()
+
+
+def this_processor() -> tuple[str, ...]:
+    """Return the name of this processor and what it can do, where there are no levels."""
     from llvmlite import binding  # pyright: ignore[reportMissingTypeStubs]
 
     llvm = cast(Any, binding)
-    told = [os.environ.get(name, "") for name in CPU]
-    return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten(), *told
+    return llvm.get_process_triple(), llvm.get_host_cpu_name(), llvm.get_host_cpu_features().flatten()
 
 
 class Code:

@@ -23,7 +23,19 @@ MAKERS = frozenset(
 
 KEEPERS = frozenset(
     PACKAGE / "kernels" / f"{name}.py"
-    for name in ("asking", "calls", "companion", "compile", "machine", "sources", "store")
+    for name in (
+        "beside",
+        "builder",
+        "calls",
+        "compile",
+        "folders",
+        "levels",
+        "library",
+        "linking",
+        "machine",
+        "sources",
+        "store",
+    )
 )
 """The sources that say when kernels are compiled and where they are kept, which changes no machine code."""
 
@@ -36,6 +48,14 @@ def versions_hash() -> str:
     digest = hashlib.sha256(sys.version.encode())
     for name in LIBRARIES:
         digest.update(_version(name).encode())
+    digest.update(makers_hash().encode())
+    return digest.hexdigest()[:16]
+
+
+@cache
+def makers_hash() -> str:
+    """Return a hash of how kernels are compiled and called here, whichever versions compile them."""
+    digest = hashlib.sha256()
     for file in sorted(MAKERS):
         digest.update(_text_of(file)[0])
     return digest.hexdigest()[:16]

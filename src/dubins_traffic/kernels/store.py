@@ -10,6 +10,7 @@ fit its hash is removed, and the kernel compiled again.
 from __future__ import annotations
 
 import ast
+import contextlib
 import hashlib
 import os
 import sys
@@ -18,20 +19,12 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
+from dubins_traffic.kernels.folders import KEPT, TIER, base_folder, own_folder
 from dubins_traffic.kernels.kinds import Kind
 from dubins_traffic.kernels.sources import PACKAGE, source_hash, versions_hash
 
 SUFFIX = ".kernel"
 """Ending of the files of compiled kernels."""
-
-FOLDER = "NUMBA_CACHE_DIR"
-"""The environment variable that names another folder for compiled kernels."""
-
-TIER = "DUBINS_TRAFFIC_KERNELS"
-"""The environment variable that says how kernels run."""
-
-KEPT = "kept"
-"""Its value where kernels are read from the cache, and none is compiled."""
 
 READABLE = 0o644
 """The mode of the files: a controller in a box (`dubins_traffic.sandbox`) is another user, and reads them."""
@@ -41,29 +34,26 @@ _DIGEST = hashlib.sha256().digest_size
 
 @cache
 def cache_folder() -> Path:
-    """Return a folder for compiled kernels that can be written: the user's cache, else a temporary one."""
-    root = os.environ.get(FOLDER)
-    if root:
-        base = Path(root)
-    else:
-        from platformdirs import user_cache_path
+    """Return a folder for compiled kernels that can be written: the user's cache, else a temporary one.
 
-        base = user_cache_path("dubins-traffic") / "kernels"
-    folder = base / versions_hash()
+    Raises
+    ------
+    OSError
+        If there is none that others can't write.
+    """
+    folder = base_folder() / versions_hash()
     if os.environ.get(TIER) == KEPT:
         return folder
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
+    with contextlib.suppress(OSError):
+        own_folder(folder)
         with tempfile.TemporaryFile(dir=folder):
             pass
-    except OSError:
-        folder = Path(tempfile.gettempdir()) / f"dubins-traffic-{os.getuid()}" / versions_hash()
-        folder.mkdir(parents=True, exist_ok=True)
-    return folder
+        return folder
+    return own_folder(Path(tempfile.gettempdir()) / f"dubins-traffic-{os.getuid()}" / versions_hash())
 
 
-def kernel_file(file: Path, name: str, kinds: Sequence[Kind], processor: Sequence[str]) -> Path:
-    """Return where the machine code of a kernel is kept.
+def key_of(file: Path, name: str, kinds: Sequence[Kind]) -> str:
+    """Return what names a kernel, whatever it is compiled for: a folder of its source and a file.
 
     Parameters
     ----------
@@ -73,19 +63,23 @@ def kernel_file(file: Path, name: str, kinds: Sequence[Kind], processor: Sequenc
         Name of the kernel in it.
     kinds : sequence of Kind
         Those of its arguments.
-    processor : sequence of str
-        What `kernels.machine.processor` returns.
     """
     module = (
         ".".join(file.relative_to(PACKAGE).with_suffix("").parts) if PACKAGE in file.parents else file.stem
     )
-    digest = hashlib.sha256(repr((tuple(kinds), tuple(processor))).encode()).hexdigest()[:24]
-    return cache_folder() / f"{module}-{source_hash(file)}" / f"{name}-{digest}{SUFFIX}"
+    digest = hashlib.sha256(repr(tuple(kinds)).encode()).hexdigest()[:24]
+    return f"{module}-{source_hash(file)}/{name}-{digest}"
 
 
-def symbol(path: Path) -> str:
+def kernel_file(key: str, processor: Sequence[str]) -> Path:
+    """Return where the machine code of a kernel is kept for a processor, as `kernels.machine.processor` returns it."""
+    digest = hashlib.sha256(repr(tuple(processor)).encode()).hexdigest()[:8]
+    return cache_folder() / f"{key}-{digest}{SUFFIX}"
+
+
+def symbol(key: str) -> str:
     """Return the name of the function in a kernel's machine code."""
-    return "kernel_" + hashlib.sha256(f"{path.parent.name}/{path.name}".encode()).hexdigest()[:24]
+    return "kernel_" + hashlib.sha256(key.encode()).hexdigest()[:24]
 
 
 def load(path: Path) -> tuple[Kind, bytes] | None:

@@ -16,7 +16,7 @@ from dubins_traffic import outside
 from dubins_traffic.controllers import registry
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import is_file
-from dubins_traffic.kernels import store
+from dubins_traffic.kernels import folders
 from dubins_traffic.sandbox import images
 from dubins_traffic.sandbox.launch import Program, Shown
 
@@ -158,9 +158,10 @@ def _python(spec: str, *shown: Shown, paths: tuple[str, ...] = ()) -> Program:
     _, _, own = interpreter()
     words = [word for path in (*own, *paths) for word in ("--path", path)]
     base = script(SHIM, *words, spec)
-    kernels = store.cache_folder().parent
-    environment = {**base.environment, **ONE_THREAD, store.FOLDER: KERNELS, store.TIER: store.KEPT}
-    seen = (*base.shown, Shown(str(kernels), KERNELS), *shown)
+    kernels = folders.base_folder()
+    environment = {**base.environment, **ONE_THREAD, folders.FOLDER: KERNELS, folders.TIER: folders.KEPT}
+    held = (Shown(str(kernels), KERNELS),) if kernels.is_dir() else ()
+    seen = (*base.shown, *held, *shown)
     return Program(base.command, seen, environment, shim=True)
 
 
