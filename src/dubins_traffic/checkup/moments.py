@@ -20,8 +20,10 @@ from dubins_traffic.cars.touching import Bodies
 from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch import outcomes
+from dubins_traffic.engine.controlled import BatchView, Maker
 from dubins_traffic.engine.lanes_together import LanesTogether
 from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.observations.flat import FlatObserver
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw, draw_many
@@ -65,10 +67,12 @@ def moments() -> Iterator[Callable[[], object]]:
             yield partial(_together, pair, name)
     yield partial(list, draw_many(load_config("town"), 0, range(MANY)))
     yield lambda: LanesTogether(pair, "sure").step()
-    problem = replace(town.problem, laser=Laser(), formulas=FORMULAS)
+    visited = "visit_ego_{}_{}".format(*town.problem.goals[0])
+    problem = replace(town.problem, laser=Laser(), formulas={**FORMULAS, "again": f"[] <> {visited}"})
     noise = Disturbances(position_noise=0.01, heading_noise=0.01, command_delay=1, command_loss=0.1)
     yield partial(run_trial, replace(town, problem=problem, disturbances=noise), "lanes")
     yield partial(run_trial, replace(town, problem=problem), _Watching())
+    yield partial(_together, pair, _Watching)
     yield partial(_checked, town)
     yield partial(_between, town)
     yield _bend
@@ -102,7 +106,7 @@ def _drawn_and_run(changes: dict[str, Any]) -> None:
 
 
 class _Watching:
-    """Stands and makes flat observations."""
+    """Stands and makes flat observations, or is asked for many trials at once."""
 
     def start(self, problem: Problem) -> None:
         """Make what observes."""
@@ -113,8 +117,15 @@ class _Watching:
         self._observe(observation)
         return 0.0, 0.0
 
+    def start_batch(self, trials: Sequence[int], problems: Sequence[Problem]) -> None:
+        """Begin trials."""
 
-def _together(instances: Sequence[Instance], driver: str) -> list[Any]:
+    def act_batch(self, view: BatchView) -> Floats:
+        """Return commands to stand, (B, 2)."""
+        return np.zeros((len(view.trial), 2))
+
+
+def _together(instances: Sequence[Instance], driver: str | Maker) -> list[Any]:
     return list(outcomes(instances, driver))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any, Final, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -18,18 +18,6 @@ from dubins_traffic.rules.exits import ego_at_exit, find_exit, lane_taken, look_
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN
 from dubins_traffic.rules.waiting import find_waiting
-
-
-class _Excuse(NamedTuple):
-    """What excuses a car in a lane that does not come on."""
-
-    NONE: int = 0
-    FOR_A_WHILE: int = 1
-    """The ego behind it in its lane while it is left, or a bend without a free exit; so long at most in a journey."""
-    YES: int = 2
-
-
-EXCUSE: Final = _Excuse()
 
 
 @jit_inline
@@ -71,11 +59,11 @@ def _judge_journey(b: int, n: int, tick: int, tables: RefereeTables) -> int:
     if long < start:
         return car.journey_since + start
     if long > start:
-        excuse = excuse_of(b, n, tick, tables) if labels.crosses[b, n] < 0 else EXCUSE.NONE
-        counts = excuse == EXCUSE.NONE and (labels.crosses[b, n] < 0 or car.exit_counts >= 0)
-        if excuse == EXCUSE.FOR_A_WHILE:
-            car.journey_excused += 1
-            counts = car.journey_excused > terms.excused_ticks
+        counts = car.exit_counts >= 0
+        if labels.crosses[b, n] < 0:
+            excused, lasts = excuse_of(b, n, tick, tables)
+            car.journey_excused += 1 if excused and not lasts else 0
+            counts = not excused or (not lasts and car.journey_excused > terms.excused_ticks)
         car.journey_spent += 1 if counts else 0
     if car.journey_over == 0 and start + car.journey_spent == terms.journey_ticks:
         car.journey_over = 1
@@ -123,39 +111,42 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
 
 
 @jit_rare
-def excuse_of(b: int, n: int, tick: int, tables: RefereeTables) -> int:
-    """Return whether car n of trial b, in a lane, has an `EXCUSE` for not coming on: its way ahead is not free (E5).
+def excuse_of(b: int, n: int, tick: int, tables: RefereeTables) -> tuple[bool, bool]:
+    """Return whether car n of trial b, in a lane, is excused for not coming on (E5), and for as long as this is so.
 
-    Norm: docs/rules.md#way.
+    Its way ahead is not free. What excuses for so long at most in a journey is the ego behind it in its lane while it
+    is left, or a bend without a free exit that is no goal.
+
+    Norm: docs/rules.md#way, docs/rules.md#moves-up.
     """
     roads, labels, row = tables.roads, tables.labels, tables.memory.car[b]
     own, terms = tables.rules[b], tables.terms[b]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
     if lane < 0 or (bits & FLAG.STOPPED != 0 and bits & FIRST_AND_CLEAR != FIRST_AND_CLEAR):
-        return EXCUSE.YES
+        return True, True
     here = row[n].progress
     place = lane_of(roads, own, b, lane)
-    excuse = EXCUSE.NONE
+    excused = lasts = False
     v = lane_end(roads, own.net, lane)
     if bits & FLAG.LEFT != 0:
         if _is_by_ego(b, n, tables):
-            beside = labels.lane[b, EGO] == lane and np.int64(labels.bits[b, EGO]) & FLAG.LEFT == 0
-            excuse = EXCUSE.FOR_A_WHILE if beside else EXCUSE.YES
+            excused = True
+            lasts = labels.lane[b, EGO] != lane or np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0
     elif _is_narrow(b, n, place, here, tables) or _lacks_room(b, n, place, here, v, tables):
-        excuse = EXCUSE.YES
+        excused = lasts = True
     vertex = int(roads.vert_off[own.net]) + v
     degree = roads.degree[vertex]
-    if excuse == EXCUSE.YES or degree >= own.crossing_degree or place.length - own.radius - here > terms.way:
-        return excuse
+    if lasts or degree >= own.crossing_degree or place.length - own.radius - here > terms.way:
+        return excused, lasts
     for k in range(tables.state.count[b]):
         if k != n and labels.crosses[b, k] == v and (k == EGO or tables.log.car[b, k].came_by == lane):
-            return EXCUSE.YES
+            return True, True
     vx, vy = roads.vertex[vertex].x, roads.vertex[vertex].y
     count = list_near(tables.state, b, tick, vx, vy, terms.lone, tables.spacing)
     if find_exit(b, n, v, way_back(v, lane, roads, own), count, tables):
-        return excuse
-    return EXCUSE.FOR_A_WHILE if degree <= 2 and not _is_goal(b, v, tables) else EXCUSE.YES
+        return excused, lasts
+    return True, degree > 2 or _is_goal(b, v, tables)
 
 
 @jit_inline
@@ -223,9 +214,9 @@ def find_ways(tick: int, tables: RefereeTables, found: Any) -> None:
     """Write into `found` (B, N) which cars have a free way ahead (E5) in frame `tick`, which has been judged."""
     for b in range(tables.state.count.shape[0]):
         for n in range(tables.state.count[b]):
-            excuse = excuse_of(b, n, tick, tables)
+            excused, lasts = excuse_of(b, n, tick, tables)
             spent = tables.log.car[b, n].journey_excused > tables.terms[b].excused_ticks
-            found[b, n] = excuse == EXCUSE.NONE or (excuse == EXCUSE.FOR_A_WHILE and spent)
+            found[b, n] = not excused or (not lasts and spent)
 
 
 @jit

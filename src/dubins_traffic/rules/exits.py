@@ -49,9 +49,9 @@ def lane_taken(b: int, n: int, v: int, tables: RefereeTables) -> int:
 
 @jit_inline
 def is_exit(lane: int, only: int, back: int) -> bool:
-    """Tell whether a lane out of a disc is an exit for a car that has taken the lane `only`, if that isn't -1.
+    """Tell whether `lane` (index), out of a disc, is an exit for a car that has taken the lane `only` (index).
 
-    Else all are, but that on the segment `back`.
+    If that is -1 all are exits, but for that on the segment `back` (index).
     """
     return lane == only if only >= 0 else lane // 2 != back
 
