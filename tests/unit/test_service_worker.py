@@ -14,6 +14,7 @@ from tests.disks import fill, small_disk
 CONTROLLER = b"class Controller:\n    pass\n"
 
 
+@pytest.mark.tools
 def test_a_full_disk_is_the_worker_s_fault(tmp_path: Path) -> None:
     with small_disk(tmp_path / "disk", 1) as disk:
         fill(disk / "ballast")
