@@ -255,7 +255,8 @@ class Judge:
             return True
         for other in self.cars:
             its = self.past[k][other]
-            behind = its["lane"] == facts["lane"] and its["progress"] < here and not its["left"]
+            rear = here - reach if other == 0 else here
+            behind = its["lane"] == facts["lane"] and its["progress"] < rear and not its["left"]
             there = its["segment"] == lane[0] and not behind
             if other != n and (there or its["crosses"] == facts["toward"]):
                 self.fired["not alone at an obstacle"] += 1

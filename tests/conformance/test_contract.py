@@ -32,7 +32,7 @@ FELL = {
 """Trials beyond the first ones in which the bar once did not hold."""
 SECONDS = 300.0 if FULL else None
 BLOCKS = {
-    "before_obstacle": "an obstacle near to the end of a lane excuses who may lack the room to come back behind it",
+    "before_obstacle": "a car before an obstacle is excused while the ego stands close behind it",
 }
 """Scenes in which e-agents that break nothing still block the ego, round a ring in no trial of the short run."""
 

@@ -401,21 +401,27 @@ def test_e5_an_obstacle_excuses_who_may_lack_room_to_pass_it() -> None:
     roads = GRID
     lane = lanes_in(roads)[0]
     length = float(roads.lengths[lane // 2])
-    waits = on_lane(roads, lane, 1.6, -0.3)
 
     def found(
-        ego: tuple[float, ...], *more: tuple[float, float], far: float = 2.4, **rules: float
+        ego: tuple[float, ...],
+        *more: tuple[float, float],
+        far: float = 2.4,
+        at: float = 1.6,
+        **rules: float,
     ) -> list[tuple[object, ...]]:
         trial = case(roads, 2, **{**SOON, **rules})
         places = [on_lane(roads, lane, *place)[:2] for place in ((far, -0.3), *more)]
         obstacles = tuple(DiscObstacle(x, y, 0.1) for x, y in places)
         problem = replace(trial.problem, obstacles=obstacles)
-        return said(judged(replace(trial, problem=problem), hold(ego, waits, frames=31)))
+        return said(
+            judged(replace(trial, problem=problem), hold(ego, on_lane(roads, lane, at, -0.3), frames=31))
+        )
 
     elsewhere = on_lane(roads, lanes_in(roads)[1], 1.6, -0.3)
     late = [("E5", 1, 30, 0)]
     assert found(elsewhere) == late
-    assert found(on_lane(roads, lane, 1.2, -0.3)) == late
+    assert found(on_lane(roads, lane, 1.2 - EPS, -0.3), at=2.7, far=2.74) == late
+    assert found(on_lane(roads, lane, 1.2 + EPS, -0.3), at=2.7, far=2.74) == []
     assert found(on_lane(roads, lane, 1.4, 0.3)) == []
     assert found(on_lane(roads, lane, 2.6, -0.3)) == []
     assert found(on_lane(roads, lane ^ 1, length - 0.9, -0.3)) == []
