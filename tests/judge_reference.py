@@ -78,19 +78,24 @@ class Judge:
         for k in range(len(self.past)):
             facts = self.past[k][n]
             v = facts["crosses"]
+            facts["goes"] = self.goes(facts["way"], 0)
             if v not in (-1, last):
                 last, begun, spent, excused, over = v, k, 0, 0, False
             elif k > begun:
                 starts = k - begun <= min(self.ticks(rules.journey_start_time), limit)
                 excused += v < 0 and not starts and facts["way"] == "for a while"
-                lasts = v < 0 and facts["way"] == "for a while" and excused > self.ticks(rules.rest_time)
-                self.fired["E5 excused for long"] += lasts
-                spent += starts or (facts["way"] == "free" or lasts if v < 0 else facts["exit"])
+                facts["goes"] = self.goes(facts["way"], excused if n else 0)
+                self.fired["E5 excused for long"] += v < 0 and facts["goes"] and facts["way"] != "free"
+                spent += starts or facts["goes" if v < 0 else "exit"]
             if spent >= limit and not over:
                 over = True
                 found.add(("E5", n, k, begun))
             facts["overdue"] = over
         return found
+
+    def goes(self, way: str, excused: int) -> bool:
+        """E5: whether the way is free, or is not only for a while, of which `excused` ticks have passed."""
+        return way == "free" or (way == "for a while" and excused > self.ticks(self.rules.rest_time))
 
     def arms(self, v: int) -> list[tuple[int, int]]:
         return [(s, ends.index(v)) for s, ends in enumerate(self.reference.ends) if v in ends]

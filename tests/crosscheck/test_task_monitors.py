@@ -163,7 +163,8 @@ def test_the_propositions_of_the_assumption_as_the_reference_finds_them(car: Car
     tickets = RuleParameters.from_mapping(instance.problem.rules).tickets
     for n, name in enumerate(names):
         for word in ("stands", "lingers", "way"):
-            assert values[f"{word}_{name}"].tolist() == [facts[n][word] for facts in past]
+            fact = "goes" if word == "way" else word
+            assert values[f"{word}_{name}"].tolist() == [facts[n][fact] for facts in past]
         if n == EGO:
             continue
         assert values[f"exit_{name}"].tolist() == [facts[n]["exit"] for facts in past]
