@@ -20,7 +20,8 @@ from dubins_traffic.problem.configuration import Configuration, load_config, shi
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.files import parse_json
-from dubins_traffic.problem.instance import Instance, Laser
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.senses import Laser
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial

@@ -23,8 +23,8 @@ from dubins_traffic.problem.configuration import Configuration, load_config, shi
 from dubins_traffic.problem.document import instance_from_document, instance_to_document, load_instance
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.files import dumps, write_document
-from dubins_traffic.problem.instance import Laser
 from dubins_traffic.problem.kinds import KINDS, kind_of, parameters_of
+from dubins_traffic.problem.senses import Laser
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
 from tests.unit import test_bad_documents as bad

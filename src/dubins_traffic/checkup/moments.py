@@ -27,7 +27,8 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.observations.flat import FlatObserver
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw, draw_many
-from dubins_traffic.problem.instance import Disturbances, Instance, Laser, Problem
+from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.problem.senses import Disturbances, Laser
 from dubins_traffic.record import reader
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack

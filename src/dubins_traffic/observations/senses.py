@@ -24,7 +24,8 @@ from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import numbers
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.instance import Instance, Laser
+    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.problem.senses import Laser
     from dubins_traffic.protocols import Scans
 
 

@@ -2,76 +2,30 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from math import inf
-from typing import TYPE_CHECKING, Annotated, Any, Self
-
-from pydantic import Field, model_validator
+from typing import TYPE_CHECKING, Any, Self
 
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.read_only import read_only
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import Pictured, count
-from dubins_traffic.problem import limits
-from dubins_traffic.problem.faults import Strict, fault
 from dubins_traffic.problem.preconditions import check_curves
 
 if TYPE_CHECKING:
+    from dubins_traffic.problem.senses import Disturbances, Laser
     from dubins_traffic.roads.network import RoadNetwork
 
 FREE = "free"
 NUDGED = "nudged"
 """The kind of e-agent that does what another kind does, delayed and with noise."""
 
-Length = Annotated[float, Field(ge=limits.LEAST, le=limits.METRES)]
-Angle = Annotated[float, Field(ge=-1e6, le=1e6)]
 
+def _undisturbed() -> Disturbances:
+    from dubins_traffic.problem.senses import Disturbances  # Pydantic, which no box is to load
 
-class Laser(Strict):
-    """A laser scanner on the car's centre; the defaults are the layout of 2016."""
-
-    rays: Annotated[int, Field(ge=1, le=limits.RAYS)] = Field(default=300, description="number of rays")
-    angle_min: Angle = Field(default=-2.0, description="bearing of the first ray, rad")
-    angle_max: Angle = Field(default=2.0, description="bearing of the last ray, rad")
-    range_min: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
-        default=0.08, description="smallest range, m"
-    )
-    range_max: Length = Field(default=5.0, description="largest range, m")
-    rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(default=10.0, description="scans per second")
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Laser:
-        if self.angle_max < self.angle_min or self.angle_max - self.angle_min > 2 * math.pi + 1e-9:
-            raise fault(
-                "not a field of view",
-                "angle_min <= angle_max <= angle_min + 2 pi",
-                "angle_max",
-                self.angle_max,
-            )
-        if self.range_max <= self.range_min:
-            raise fault(
-                "not a range", f"a number > range_min = {self.range_min}", "range_max", self.range_max
-            )
-        return self
-
-
-class Disturbances(Strict):
-    """Seeded disturbances of the ego."""
-
-    position_noise: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
-        default=0.0, description="standard deviation of the observed position, m"
-    )
-    heading_noise: Annotated[float, Field(ge=0, le=10)] = Field(
-        default=0.0, description="standard deviation of the observed heading, rad"
-    )
-    command_delay: Annotated[int, Field(ge=0, le=limits.DELAY)] = Field(
-        default=0, description="ticks by which commands take effect late"
-    )
-    command_loss: Annotated[float, Field(ge=0, le=1)] = Field(
-        default=0.0, description="probability that a command is lost and the last one stays in force"
-    )
+    return Disturbances()
 
 
 @dataclass(frozen=True, slots=True)
@@ -164,7 +118,7 @@ class Instance(Pictured):
     e_agents: tuple[EAgent, ...]
     seed: int
     trial: int
-    disturbances: Disturbances = field(default_factory=Disturbances)
+    disturbances: Disturbances = field(default_factory=_undisturbed)
     end_on_collision: bool = False
     simulator: str = "embedded"
     extra: Mapping[str, Any] = field(default_factory=dict[str, Any])

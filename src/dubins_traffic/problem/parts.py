@@ -29,7 +29,7 @@ from dubins_traffic.cars.dynamics import check_name
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, fault
-from dubins_traffic.problem.instance import Laser, Length
+from dubins_traffic.problem.senses import Laser, Length
 from dubins_traffic.rules.parameters import RuleParameters
 
 Width = Annotated[float, Field(ge=limits.WIDTHS[0], le=limits.WIDTHS[1])]

@@ -13,7 +13,6 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Careful, Open, Strict, fault
 from dubins_traffic.problem.formulas import Formulas
-from dubins_traffic.problem.instance import Disturbances, Length
 from dubins_traffic.problem.kinds import KINDS, NAMES_2016, NetworkPoint
 from dubins_traffic.problem.parts import (
     ROADS,
@@ -24,6 +23,7 @@ from dubins_traffic.problem.parts import (
     Rules,
 )
 from dubins_traffic.problem.poses import GivenHeading, GivenPose, Start
+from dubins_traffic.problem.senses import Disturbances, Length
 from dubins_traffic.roads.from_grid import most_segments
 from dubins_traffic.roads.generate import MOST_INTERSECTIONS
 from dubins_traffic.rules.parameters import RuleParameters
