@@ -7,7 +7,6 @@ from typing import Any
 
 from dubins_traffic.cars.body import Car
 from dubins_traffic.errors import InputError
-from dubins_traffic.problem.faults import more_faults
 from dubins_traffic.roads.clearance import SEGMENT_SLACK, clearance_faults
 from dubins_traffic.roads.network import RoadNetwork
 
@@ -52,6 +51,8 @@ def check_demands(
         )
     faults = clearance_faults(network, radius, reach, car.w, rules["segment_slack"])
     if faults:
+        from dubins_traffic.problem.faults import more_faults  # Pydantic, which no box is to load
+
         first = faults[0]
         more = more_faults(len(faults) - 1) if len(faults) > 1 else ""
         error = InputError(
