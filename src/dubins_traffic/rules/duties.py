@@ -117,7 +117,7 @@ def excuse_of(b: int, n: int, tick: int, tables: RefereeTables) -> tuple[bool, b
     Its way ahead is not free. What excuses for so long at most in a journey is the ego behind it in its lane while it
     is left, or a bend without a free exit that is no goal.
 
-    Norm: docs/rules.md#way, docs/rules.md#moves-up.
+    Norm: docs/rules.md#way, docs/rules.md#moving-up.
     """
     roads, labels, row = tables.roads, tables.labels, tables.memory.car[b]
     own, terms = tables.rules[b], tables.terms[b]
