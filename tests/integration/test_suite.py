@@ -22,14 +22,13 @@ SLOW = """
 import time
 from pathlib import Path
 
-begun = 0
-
 
 class Slow:
     def start(self, problem):
-        global begun
-        begun += 1
-        while begun > 6 and not Path(__file__).with_name("go").exists():
+        begun, go = (Path(__file__).with_name(name) for name in ("begun", "go"))
+        with begun.open("a") as file:
+            file.write(".")
+        while begun.stat().st_size > 6 and not go.exists():
             time.sleep(0.02)
 
     def act(self, observation):
