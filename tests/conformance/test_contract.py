@@ -46,15 +46,13 @@ def _came(name: str) -> list[Came]:
         return list(pool.map(partial(trial, name, seconds=SECONDS), numbers))
 
 
-def _marked(names: list[str], known: dict[str, str]) -> list[object]:
-    """Return the names of scenes, those that are `known` to fail as such."""
-    return [
-        pytest.param(name, marks=pytest.mark.xfail(reason=known[name])) if name in known else name
-        for name in names
-    ]
-
-
-@pytest.mark.parametrize("name", _marked(list(BLOCKING), BLOCKS))
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param(name, marks=pytest.mark.xfail(reason=BLOCKS[name])) if name in BLOCKS else name
+        for name in BLOCKING
+    ],
+)
 def test_who_blocks_the_ego_breaks_a_rule(name: str) -> None:
     came = _came(name)
     assert [one for one in came if one.own] == []

@@ -63,7 +63,7 @@ def _judge_journey(b: int, n: int, tick: int, tables: RefereeTables) -> int:
         if labels.crosses[b, n] < 0:
             excused, lasts = excuse_of(b, n, tick, tables)
             car.journey_excused += 1 if excused and not lasts else 0
-            counts = not excused or (not lasts and car.journey_excused > terms.excused_ticks)
+            counts = _is_way_free(b, n, excused, lasts, tables)
         car.journey_spent += 1 if counts else 0
     if car.journey_over == 0 and start + car.journey_spent == terms.journey_ticks:
         car.journey_over = 1
@@ -85,7 +85,7 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
     car, ego = log.car[b, n], log.car[b, EGO]
     back = way_back(v, car.came_by, tables.roads, tables.rules[b])
     free, again = look_for_exit(b, n, tick, v, back, tables)
-    if tables.labels.at[b, n] != v and lane_taken(b, n, v, tables) >= 0:
+    if lane_taken(b, n, v, tables) >= 0:
         car.been_out = 1
     paused = False
     if tables.labels.crosses[b, EGO] == v and car.been_out == 0:
@@ -147,6 +147,13 @@ def excuse_of(b: int, n: int, tick: int, tables: RefereeTables) -> tuple[bool, b
     if find_exit(b, n, v, way_back(v, lane, roads, own), count, tables):
         return excused, lasts
     return True, degree > 2 or _is_goal(b, v, tables)
+
+
+@jit_inline
+def _is_way_free(b: int, n: int, excused: bool, lasts: bool, tables: RefereeTables) -> bool:
+    """Tell whether the way of car n counts as free; the rest is as `excuse_of` says."""
+    spent = tables.log.car[b, n].journey_excused > tables.terms[b].excused_ticks
+    return not excused or (not lasts and spent)
 
 
 @jit_inline
@@ -217,8 +224,7 @@ def find_ways(tick: int, tables: RefereeTables, found: Any) -> None:
     for b in range(tables.state.count.shape[0]):
         for n in range(tables.state.count[b]):
             excused, lasts = excuse_of(b, n, tick, tables)
-            spent = tables.log.car[b, n].journey_excused > tables.terms[b].excused_ticks
-            found[b, n] = not excused or (not lasts and spent)
+            found[b, n] = _is_way_free(b, n, excused, lasts, tables)
 
 
 @jit

@@ -18,7 +18,7 @@ LATE = 1.0
 """A car that has been in a crossing for this long, seconds, keeps its exit while that is open, even if there may be no
 room behind the cars there: on the way to another exit it might not leave the disc in time."""
 
-COMES = 0.5
+SOON = 0.5
 """Within this distance of a bend, metres, a car is about to enter it."""
 CHOICES = 4
 """A car in a crossing looks for another exit once in this many ticks."""
@@ -140,18 +140,25 @@ def bars_others(b: int, n: int, traffic: Traffic) -> bool:
 
     Who came by the other road is no excuse for them (E4), and the way back no exit for it.
     """
-    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
-    net, vehicle = drivers.net[b], drivers.vehicle[b]
-    v = lane_end(roads, net, drivers.car[b, n].lane)
-    corner = roads.vertex[int(roads.vert_off[net]) + v]
-    near = vehicle.disc + vehicle.reach + COMES
-    for j in range(state.count[b]):
-        lane = labels.lane[b, j]
-        dx, dy = state.x[b, j] - corner.x, state.y[b, j] - corner.y
-        comes = lane >= 0 and lane_end(roads, net, int(lane)) == v and dx * dx + dy * dy < near * near
-        if j != n and (comes or labels.crosses[b, j] == v):
+    drivers = traffic.drivers
+    v = lane_end(traffic.roads, drivers.net[b], drivers.car[b, n].lane)
+    for j in range(traffic.state.count[b]):
+        if j != n and (traffic.labels.crosses[b, j] == v or is_about_to_enter(b, j, v, traffic)):
             return True
     return False
+
+
+@jit_inline
+def is_about_to_enter(b: int, j: int, v: int, traffic: Traffic) -> bool:
+    """Tell whether car j is near to the end of its lane, and that is the intersection v."""
+    state, roads, drivers = traffic.state, traffic.roads, traffic.drivers
+    lane, net = traffic.labels.lane[b, j], drivers.net[b]
+    if lane < 0 or lane_end(roads, net, int(lane)) != v:
+        return False
+    corner = roads.vertex[int(roads.vert_off[net]) + v]
+    dx, dy = state.x[b, j] - corner.x, state.y[b, j] - corner.y
+    near = drivers.vehicle[b].disc + drivers.vehicle[b].reach + SOON
+    return bool(dx * dx + dy * dy < near * near)
 
 
 @jit_inline

@@ -9,7 +9,13 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
-from dubins_traffic.policies.rules.choice import take_another, take_last_resort, take_way_on, take_widest
+from dubins_traffic.policies.rules.choice import (
+    is_about_to_enter,
+    take_another,
+    take_last_resort,
+    take_way_on,
+    take_widest,
+)
 from dubins_traffic.policies.rules.chosen import holds
 from dubins_traffic.policies.rules.exits import ticks_of
 from dubins_traffic.policies.rules.kept import KeptPath
@@ -24,8 +30,6 @@ CHOOSY = 1.0
 """Seconds for which a car whose turn it is waits for room in its preferred exit."""
 BUDGET = 4.0
 """Metres of detour that a car on its round accepts per second it has waited for room."""
-SOON = 0.5
-"""A car this near to a bend enters it before one that turns round there, metres."""
 DUTY = 0.8
 """An e-agent that has lost its place once enters after this share of the time in which it would lose it again, even
 without room in any exit: otherwise it breaks E3."""
@@ -211,16 +215,10 @@ def turns_round(car: Driver) -> bool:
 @jit_inline
 def comes_first(b: int, n: int, j: int, v: int, traffic: Traffic) -> bool:
     """Tell whether car j comes into a bend or dead end by another lane before car n, which turns round there."""
-    state, labels, roads, drivers = traffic.state, traffic.labels, traffic.roads, traffic.drivers
-    lane, net = labels.lane[b, j], drivers.net[b]
-    if lane < 0 or lane == drivers.car[b, n].lane or lane_end(roads, net, int(lane)) != v:
+    drivers = traffic.drivers
+    if traffic.labels.lane[b, j] == drivers.car[b, n].lane or not is_about_to_enter(b, j, v, traffic):
         return False
-    row = int(roads.vert_off[net]) + v
-    dx = state.x[b, j] - roads.vertex[row].x
-    dy = state.y[b, j] - roads.vertex[row].y
-    near = drivers.vehicle[b].disc + drivers.vehicle[b].reach + SOON
-    first = n == EGO or j < n or not turns_round(drivers.car[b, j])
-    return dx * dx + dy * dy < near * near and first
+    return n == EGO or j < n or not turns_round(drivers.car[b, j])
 
 
 @jit
