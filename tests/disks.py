@@ -13,10 +13,10 @@ from tests.tools import need
 
 
 @contextmanager
-def small_disk(place: Path, mebibytes: int) -> Iterator[Path]:
-    """Mount a file system of so many MiB at a place."""
+def small_disk(place: Path, kibibytes: int) -> Iterator[Path]:
+    """Mount a file system of so many KiB at a place."""
     place.mkdir()
-    command = ["mount", "-t", "tmpfs", "-o", f"size={mebibytes}m,mode=755", "tmpfs", str(place)]
+    command = ["mount", "-t", "tmpfs", "-o", f"size={kibibytes}k,mode=755", "tmpfs", str(place)]
     refused = os.geteuid() != 0 or subprocess.run(command, capture_output=True, check=False).returncode
     need("the right to mount" if refused else "", "it takes root, on a machine that allows mounts")
     try:

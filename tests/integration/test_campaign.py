@@ -10,7 +10,6 @@ import signal
 import subprocess
 import time
 from collections import Counter
-from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -19,7 +18,7 @@ import pytest
 from pyarrow import parquet
 
 from tests.campaigns import campaign, command, logged, run, succeed, written
-from tests.tools import need
+from tests.disks import small_disk
 
 TRIALS = 2 * 4 * 8
 
@@ -143,30 +142,19 @@ def test_bad_trials_are_rows(tmp_path: Path) -> None:
     assert records == {f"trial-{number:09d}.mcap" for number in failed}
 
 
-@pytest.fixture
-def small_disk(tmp_path: Path) -> Iterator[Path]:
-    """A file system of 64 KiB."""
-    place = tmp_path / "disk"
-    place.mkdir()
-    mount = ["mount", "-t", "tmpfs", "-o", "size=64k", "tmpfs", str(place)]
-    refused = os.geteuid() != 0 or subprocess.run(mount, check=False, capture_output=True).returncode
-    need("the right to mount" if refused else "", "it takes root, on a machine that allows mounts")
-    yield place
-    subprocess.run(["umount", str(place)], check=True)
-
-
 @pytest.mark.tools
-def test_a_full_disk_keeps_what_is_finished(tmp_path: Path, small_disk: Path, table: bytes) -> None:
-    file, out = written(tmp_path, campaign()), small_disk / "out"
-    done = run(file, out, "--workers", "2")
-    assert done.returncode == 2
-    assert "No space left on device" in done.stderr
-    assert not (out / "results.parquet").exists()
-    finished, begun = kept(out), logged(tmp_path)
-    assert 0 < finished < TRIALS
-    subprocess.run(["mount", "-o", "remount,size=4m", str(small_disk)], check=True)
-    assert succeed(file, out, "--resume", "--workers", "2") == table
-    assert logged(tmp_path) - begun <= TRIALS - finished
+def test_a_full_disk_keeps_what_is_finished(tmp_path: Path, table: bytes) -> None:
+    with small_disk(tmp_path / "disk", 64) as disk:
+        file, out = written(tmp_path, campaign()), disk / "out"
+        done = run(file, out, "--workers", "2")
+        assert done.returncode == 2
+        assert "No space left on device" in done.stderr
+        assert not (out / "results.parquet").exists()
+        finished, begun = kept(out), logged(tmp_path)
+        assert 0 < finished < TRIALS
+        subprocess.run(["mount", "-o", "remount,size=4m", str(disk)], check=True)
+        assert succeed(file, out, "--resume", "--workers", "2") == table
+        assert logged(tmp_path) - begun <= TRIALS - finished
 
 
 def test_a_table_that_has_no_room_is_made_later(tmp_path: Path, table: bytes) -> None:

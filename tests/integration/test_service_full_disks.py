@@ -32,7 +32,7 @@ def open_folder() -> Iterator[Path]:
 
 def test_the_disk_of_the_service(tmp_path: Path) -> None:
     """Database, store and worker find no room: what is sent is refused, nothing is half kept, and then all goes on."""
-    with small_disk(tmp_path / "here", 24) as here:
+    with small_disk(tmp_path / "here", 24 << 10) as here:
         with season(tmp_path, SETTINGS, "--workers", "1") as service:
             organiser = service.organiser()
             person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
@@ -63,7 +63,7 @@ def suffers(log: Path, since: int) -> bool:
 
 def test_the_disk_of_the_store(tmp_path: Path) -> None:
     """A worker keeps what it can't hand over, and hands it over when there is room: no trial is run a second time."""
-    with small_disk(tmp_path / "disk", 8) as disk:
+    with small_disk(tmp_path / "disk", 8 << 10) as disk:
         settings = f'{SETTINGS}storage = "{disk / "store"}"\n'
         with season(tmp_path, settings, "--workers", "1") as service:
             organiser = service.organiser()
@@ -85,7 +85,7 @@ def test_the_disk_of_the_store(tmp_path: Path) -> None:
 
 def test_the_disk_of_postgresql(tmp_path: Path, open_folder: Path) -> None:
     """No room for tables, and none for its log, which ends PostgreSQL: reports and uploads wait for it."""
-    with small_disk(open_folder / "disk", 96) as disk, postgres.cluster(disk) as cluster:
+    with small_disk(open_folder / "disk", 96 << 10) as disk, postgres.cluster(disk) as cluster:
         url = cluster.url("full")
         settings = f'{SETTINGS}database = "{url}"\n'
         with season(tmp_path, settings, "--workers", "1") as service:

@@ -127,7 +127,7 @@ def test_a_full_disk_is_this_machine_s_fault(
     tmp_path: Path, drive: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     place = submission(tmp_path, made.layer(tmp_path, files={"drive": drive.read_bytes()}), 'CMD ["/drive"]')
-    with small_disk(tmp_path / "disk", 1) as disk:
+    with small_disk(tmp_path / "disk", 1 << 10) as disk:
         monkeypatch.setattr(platformdirs, "user_cache_dir", lambda _name: str(disk))
         fill(disk / "ballast", 200_000)
         with pytest.raises(InputError, match="can't be unpacked") as found:

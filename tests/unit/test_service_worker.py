@@ -16,7 +16,7 @@ CONTROLLER = b"class Controller:\n    pass\n"
 
 @pytest.mark.tools
 def test_a_full_disk_is_the_worker_s_fault(tmp_path: Path) -> None:
-    with small_disk(tmp_path / "disk", 1) as disk:
+    with small_disk(tmp_path / "disk", 1 << 10) as disk:
         fill(disk / "ballast")
         with pytest.raises(InputError, match="can't be stored") as found:
             check_submission(CONTROLLER, disk)
