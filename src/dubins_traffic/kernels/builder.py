@@ -78,7 +78,7 @@ def _stand_back() -> None:
     Some systems share processors among sessions first, and among the processes of each then. The builder has a
     session of its own, which would get as much as that of the command; so that stands back as well.
     """
-    os.nice(NICE)
+    os.setpriority(os.PRIO_PROCESS, 0, NICE)
     with contextlib.suppress(OSError):
         _stand_back_as_session()
     with contextlib.suppress(OSError, AttributeError):
