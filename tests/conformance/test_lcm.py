@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-pytest.importorskip("lcm")
+pytest.importorskip("lcm", reason="LCM's wheel needs libglib2.0-0: scripts/system-packages.sh installs it")
 
 from lcm import LCM
 from scripts import lcm_messages

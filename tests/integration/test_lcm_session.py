@@ -13,7 +13,7 @@ from pathlib import Path
 
 import pytest
 
-pytest.importorskip("lcm")
+pytest.importorskip("lcm", reason="LCM's wheel needs libglib2.0-0: scripts/system-packages.sh installs it")
 
 import lcm as library
 

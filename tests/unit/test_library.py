@@ -18,6 +18,8 @@ from dubins_traffic.kernels.trig import sincos
 
 pytestmark = pytest.mark.skipif(not levels.levels(), reason="libraries are for Linux on x86-64")
 
+LINKED = pytest.mark.tools("linkers")
+"""The mark of tests that link a library."""
 ASKED = """
 import sys
 from dubins_traffic.kernels import beside
@@ -63,6 +65,7 @@ def cache(made, tmp_path) -> Path:
     return tmp_path
 
 
+@LINKED
 def test_a_library_is_called_without_a_compiler(cache) -> None:
     assert python(cache, ASKED) == (QUICK, "")
 
@@ -74,6 +77,7 @@ def test_without_library_and_compiler_kernels_run_interpreted_and_one_line_says_
     assert "dubins-traffic[compile]" in said
 
 
+@LINKED
 def test_of_a_library_of_other_sources_nothing_is_called(cache, tmp_path) -> None:
     package = Path(dubins_traffic.__file__).parent
     shutil.copytree(package, tmp_path / "src" / package.name, ignore=shutil.ignore_patterns("__pycache__"))
@@ -82,6 +86,7 @@ def test_of_a_library_of_other_sources_nothing_is_called(cache, tmp_path) -> Non
     assert python(cache, ASKED, PYTHONPATH=str(tmp_path / "src"))[0] == SLOW
 
 
+@LINKED
 @pytest.mark.parametrize("harm", ["other bytes", "no library", "no manifest in JSON"])
 def test_a_damaged_library_is_left_alone_and_said(cache, harm) -> None:
     (library,) = (cache / "library").glob("*.so")
@@ -97,6 +102,7 @@ def test_a_damaged_library_is_left_alone_and_said(cache, harm) -> None:
     assert "can't be used" in said
 
 
+@LINKED
 @pytest.mark.parametrize("mode", [0o775, 0o757])
 def test_a_folder_that_others_can_write_is_not_loaded_from_but_by_boxes(cache, mode) -> None:
     (cache / "library").chmod(mode)
@@ -115,6 +121,7 @@ def test_whose_folders_above_are_open_to_all_is_not_private(tmp_path) -> None:
     assert not is_private(tmp_path / "gone")
 
 
+@LINKED
 def test_the_manifest_says_what_the_library_was_built_of_and_an_older_library_goes(cache) -> None:
     (manifest,) = (cache / "library").glob("*.json")
     told = json.loads(manifest.read_text())
@@ -126,6 +133,7 @@ def test_the_manifest_says_what_the_library_was_built_of_and_an_older_library_go
     assert sorted(path.suffix for path in (cache / "library").iterdir()) == [".json", ".so"]
 
 
+@LINKED
 def test_no_library_has_fused_operations_or_needs_another(made) -> None:
     (library,) = (made / "library").glob("*.so")
     if shutil.which("readelf") is None:
@@ -180,6 +188,7 @@ def test_without_a_linker_it_is_said_how_to_get_one(monkeypatch) -> None:
     assert linking.linker() == ["mine", "-m64"]
 
 
+@LINKED
 @pytest.mark.parametrize("linker", ["false", "/gone/cc"])
 def test_a_linker_that_fails_leaves_the_library_as_it_was(cache, linker) -> None:
     before = {path.name: path.read_bytes() for path in (cache / "library").iterdir()}

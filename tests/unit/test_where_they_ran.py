@@ -51,6 +51,7 @@ def test_scores_say_it_one_by_one_and_in_batches() -> None:
     assert own["ran"] == "in process"
 
 
+@pytest.mark.tools("boxes")
 def test_the_table_of_a_campaign_says_it(tmp_path: Path) -> None:
     campaign = Campaign.from_document(document()["campaign"] | {"controllers": ["rules", "simple+sandbox"]})
     run_campaign(campaign, tmp_path / "out", workers=1)
@@ -59,6 +60,7 @@ def test_the_table_of_a_campaign_says_it(tmp_path: Path) -> None:
     assert pairs == {("rules", "in process"), ("simple+sandbox", "boxed")}
 
 
+@pytest.mark.tools("boxes")
 def test_strangers_controllers_get_boxes() -> None:
     given = [
         "rules",
