@@ -100,11 +100,11 @@ class Client:
             self.places.write(m.ModelState("ego", pose))
             assert time.monotonic() < end
 
-    def watch(self, seconds: float) -> list[tuple[float, float]]:
-        """Return where the ego is seen in so many seconds, once at least."""
+    def watch(self, seconds: float, times: int = 1) -> list[tuple[float, float]]:
+        """Return where the ego is seen in so many seconds, and until it has been seen so many times."""
         seen: list[tuple[float, float]] = []
         end = time.monotonic() + seconds
-        while time.monotonic() < end or not seen:
+        while time.monotonic() < end or len(seen) < times:
             assert time.monotonic() < end + 600
             for states in self.graph.take(self.states, m.ModelStates, 100):
                 position = states.pose[states.name.index("ego")].position
