@@ -39,6 +39,18 @@ SECTIONS: dict[str, tuple[str, ...]] = {
     ),
 }
 """Heading of the sidebar: its pages."""
+LABELS: dict[str, str] = {
+    "tutorials/first-controller": "Tutorial: first controller",
+    "tutorials/reading-a-verdict": "Tutorial: reading a verdict",
+    "tutorials/ros": "Tutorial: ROS",
+    "tutorials/synthesis": "Tutorial: synthesis",
+    "tutorials/learning": "Tutorial: learning",
+    "tutorials/campaign": "Tutorial: campaign",
+    "tutorials/competition": "Tutorial: competition",
+    "foreign-strategies": "Foreign strategies",
+    "learning": "Learning",
+}
+"""Page: what the sidebar calls it, where that is not its heading."""
 SHOWN = frozenset(name for names in SECTIONS.values() for name in names)
 ELSEWHERE = {"index", "package"}
 """Pages of docs/ that the site does not show: its own first page stands for them."""

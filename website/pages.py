@@ -7,7 +7,7 @@ import re
 import shutil
 from pathlib import Path
 
-from order import ELSEWHERE, SECTIONS, SHOWN
+from order import ELSEWHERE, LABELS, SECTIONS, SHOWN
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -108,8 +108,9 @@ def _place(target: Path, listings: set[Path]) -> str | None:
 
 
 def _contents(names: tuple[str, ...], caption: str) -> str:
+    pages = [f"{LABELS[name]} <{name}>" if name in LABELS else name for name in names]
     return "\n".join(
-        ["```{toctree}", ":maxdepth: 1", ":hidden:", f":caption: {caption}", "", *names, "```", ""]
+        ["```{toctree}", ":maxdepth: 1", ":hidden:", f":caption: {caption}", "", *pages, "```", ""]
     )
 
 
