@@ -82,7 +82,8 @@ def compare(configuration: str, output: Path, controllers: Sequence[str], trials
         print(f"{len(plan.jobs)} trials with {controller}", file=sys.stderr)
         sheets[name] = plan.conclude(dt.run_trials(plan.jobs))
     Console().print(side_by_side(sheets))
-    print("Counted rounds rank controllers; ICRA 2016 counts samples (docs/scores.md).\n")
+    print("Controllers are ranked by counted rounds, which are the rounds of clean trials.")
+    print("ICRA 2016 is the score of that competition, and ranks nothing (docs/scores.md).\n")
     for sheet in sheets.values():
         for score in sheet.trials:
             print(score.record)

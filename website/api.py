@@ -8,6 +8,7 @@ from pathlib import Path
 
 import dubins_traffic
 from dubins_traffic import sandbox
+from pages import ORPHAN
 
 GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
     "networks": ("Road networks", ("RoadNetwork", "generate_network")),
@@ -77,7 +78,7 @@ def write_api(folder: Path) -> None:
     if missing := set(dubins_traffic.__all__) - named - {"__version__"}:
         raise SystemExit(f"website/api.py: on no page stand {', '.join(sorted(missing))}")
     for page, (heading, names) in GROUPS.items():
-        parts = [f"# {heading}", "", *(_entry(name) for name in names)]
+        parts = [f"{ORPHAN}# {heading}", "", *(_entry(name) for name in names)]
         (folder / f"{page}.md").write_text("\n".join(parts), encoding="utf-8")
     (folder / "index.md").write_text(_index(), encoding="utf-8")
 
@@ -98,5 +99,4 @@ def _index() -> str:
         f"| [{heading}]({page}.md) | {', '.join(f'{{py:obj}}`{name} <dubins_traffic.{name}>`' for name in names)} |"
         for page, (heading, names) in GROUPS.items()
     ]
-    contents = "\n".join(["```{toctree}", ":hidden:", "", *GROUPS, "```"])
-    return "\n".join([HEAD, "| page | names |", "|---|---|", *rows, "", contents, ""])
+    return "\n".join([HEAD, "| page | names |", "|---|---|", *rows, ""])

@@ -15,7 +15,7 @@ from api import write_api
 from command_line import write_command_line
 from gallery import write_gallery
 from pages import ROOT, gather
-from results import write_results
+from results import put_on_front, write_results
 
 
 def main() -> int:
@@ -34,6 +34,7 @@ def main() -> int:
         write_command_line(source / "reference" / "command-line.md")
         write_gallery(source / "gallery.md", extra / "gallery")
         write_results(source / "results.md", extra / "results")
+        put_on_front(source / "index.md")
         return _build(source, extra, folder, Path(given) / "doctrees")
 
 

@@ -7,7 +7,7 @@ import re
 import shutil
 from pathlib import Path
 
-from order import BELOW, ELSEWHERE, SECTIONS
+from order import ELSEWHERE, LABELS, SECTIONS, SHOWN
 
 ROOT = Path(__file__).parents[1]
 DOCS = ROOT / "docs"
@@ -27,6 +27,8 @@ ANCHOR = re.compile(r'<a id="([^"]+)"></a>')
 FENCE = re.compile(r"^(```.*?^```|~~~.*?^~~~)", re.MULTILINE | re.DOTALL)
 MARK = re.compile(r"^<!-- test: [^\n]* -->\n", re.MULTILINE)
 """What a page says to the tests, which is not for the site (`tests/shown.py`)."""
+ORPHAN = "---\norphan: true\n---\n\n"
+"""What a page says at its head that the sidebar does not show."""
 LANGUAGES = {".py": "python", ".toml": "toml", ".json": "json", ".cpp": "cpp", ".c": "c"}
 
 
@@ -46,7 +48,6 @@ def gather(source: Path) -> None:
     for path in sorted(listings):
         _write_listing(source, path)
     _write_index(source)
-    _write_notes(source)
 
 
 def _write(source: Path, path: Path, name: str, listings: set[Path]) -> None:
@@ -57,7 +58,8 @@ def _write(source: Path, path: Path, name: str, listings: set[Path]) -> None:
     )
     if name in TITLES:
         made = re.sub(r"\A# .*", f"# {TITLES[name]}", made)
-    made += _below(name.removesuffix(".md"))
+    if name.removesuffix(".md") not in SHOWN:
+        made = ORPHAN + made
     place = source / name
     place.parent.mkdir(parents=True, exist_ok=True)
     place.write_text(made, encoding="utf-8")
@@ -105,18 +107,11 @@ def _place(target: Path, listings: set[Path]) -> str | None:
     return None
 
 
-def _below(name: str) -> str:
-    """Return the table of contents below a page that stands for a folder."""
-    if name not in BELOW:
-        return ""
-    folder = DOCS / BELOW[name]
-    names = [path.stem for path in sorted(folder.glob("*.md")) if path.stem != "index"]
-    return "\n\n" + _contents(names)
-
-
-def _contents(names: list[str], caption: str = "", depth: int = 1) -> str:
-    head = ["```{toctree}", f":maxdepth: {depth}", ":hidden:"] + ([f":caption: {caption}"] if caption else [])
-    return "\n".join([*head, "", *names, "```", ""])
+def _contents(names: tuple[str, ...], caption: str) -> str:
+    pages = [f"{LABELS[name]} <{name}>" if name in LABELS else name for name in names]
+    return "\n".join(
+        ["```{toctree}", ":maxdepth: 1", ":hidden:", f":caption: {caption}", "", *pages, "```", ""]
+    )
 
 
 def _write_listing(source: Path, path: Path) -> None:
@@ -125,23 +120,11 @@ def _write_listing(source: Path, path: Path) -> None:
     place.parent.mkdir(parents=True, exist_ok=True)
     language = "xml" if path.suffix in MARKUP else LANGUAGES.get(path.suffix, "text")
     text = path.read_text(encoding="utf-8")
-    place.write_text(
-        f"---\norphan: true\n---\n\n# `{inside}`\n\n````{language}\n{text.rstrip()}\n````\n", encoding="utf-8"
-    )
+    place.write_text(f"{ORPHAN}# `{inside}`\n\n````{language}\n{text.rstrip()}\n````\n", encoding="utf-8")
 
 
 def _write_index(source: Path) -> None:
     """Write the first page: what the package is, how to begin, and the contents of the site."""
     text = MARK.sub("", Path(__file__).with_name("index.md").read_text(encoding="utf-8"))
-    contents = "\n".join(_contents(list(names), heading) for heading, names in SECTIONS.items())
-    (source / "index.md").write_text(f"{text}\n{_contents(['readme'])}\n{contents}", encoding="utf-8")
-
-
-def _write_notes(source: Path) -> None:
-    """Write the page on the design notes, from the table of docs/index.md."""
-    index = (DOCS / "index.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| \[(\d+)\]\(design/([\w-]+\.md)\) \| (.*) \|$", index, re.MULTILINE)
-    table = "\n".join(f"| [{number}]({name}) | {about} |" for number, name, about in rows)
-    names = [name.removesuffix(".md") for _, name, _ in rows]
-    head = "# Design notes\n\nWhy something is as it is.\n\n| note | is about |\n|---|---|\n"
-    (source / "design" / "index.md").write_text(f"{head}{table}\n\n{_contents(names)}", encoding="utf-8")
+    contents = "\n".join(_contents(names, heading) for heading, names in SECTIONS.items())
+    (source / "index.md").write_text(f"{text}\n{contents}", encoding="utf-8")

@@ -5,6 +5,7 @@ The files of results stand in `website/results/`; the site's page is made of the
 
 from __future__ import annotations
 
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -17,6 +18,8 @@ from dubins_traffic.suites.writing import PAGE, TABLE, results
 
 HERE = Path(__file__).parent
 KEPT = HERE / "results"
+FRONT = "<!-- results -->"
+"""Where the first page shows some of them."""
 CONTROLLERS = ("lanes", "lanes+shield", "rules", "rules+shield", "simple", "simple+shield")
 """Who drives where a suite does not say: the built-in ones, with and without the shield."""
 ASKED = {"adversary-2026": [word for name in CONTROLLERS for word in ("--controller", name)]}
@@ -59,6 +62,29 @@ def write_results(page: Path, folder: Path) -> None:
         )
         parts += [f"#{made[TABLE]}", links, ""]
     page.write_text("\n".join(parts), encoding="utf-8")
+
+
+def put_on_front(page: Path) -> None:
+    """Put a table of the built-in controllers where the first page says so, best first in `rules-2026`."""
+    files = {
+        name: json.loads(kept(name).read_text(encoding="utf-8"))
+        for name in ("rules-2026", "adversary-2026", "icra2016")
+    }
+    rules, adversary, icra = (
+        {entry["controller"]: entry["columns"] for entry in file["entries"]} for file in files.values()
+    )
+    rows = [
+        "| controller | counted rounds a trial, `rules-2026` | clean there | clean in `adversary-2026` | `icra2016` |",
+        "|---|---|---|---|---|",
+    ]
+    for name in sorted(rules, key=lambda name: -sum(rules[name]["counted_rounds"])):
+        own, worst = rules[name], adversary[name]
+        mean = sum(own["counted_rounds"]) / len(own["counted_rounds"])
+        score = sum(icra[name]["icra2016"]) / len(icra[name]["icra2016"])
+        clean, held = (f"{sum(found['clean'])} of {len(found['clean'])}" for found in (own, worst))
+        rows.append(f"| `{name}` | {mean:.2f} | {clean} | {held} | {score:.0f} |")
+    text = page.read_text(encoding="utf-8")
+    page.write_text(text.replace(FRONT, "\n".join(rows)), encoding="utf-8")
 
 
 def run() -> int:

@@ -34,7 +34,7 @@ LOOKS = {
     "rules.referee_kernel._is_as_before",
     "scoring.tally._is_far",
 }
-"""Where kernels look into what is kept: one for each paragraph of docs/design/030-batch.md."""
+"""Where kernels look into what is kept: one for each paragraph of docs/design/030-speed.md."""
 
 
 def test_golden_cases_are_the_same_without_any_cache() -> None:

@@ -23,6 +23,8 @@ from tests.browser import browsing
 ROOT = Path(__file__).parents[2]
 FETCHES = {"link": "href", "script": "src", "img": "src", "iframe": "src", "source": "src", "object": "data"}
 """What a browser loads by itself."""
+MOST_IN_THE_SIDEBAR = 40
+HEADINGS = ["Start", "The task", "Drive", "Evaluate", "Compete", "Reference"]
 
 
 class Page(HTMLParser):
@@ -72,13 +74,29 @@ def test_every_page_of_the_documentation_is_there(pages: dict[Path, Page], site:
     assert wanted - there == {"package.md"}
 
 
-def test_the_menu_names_every_page_once(site: Path) -> None:
+def test_the_sidebar_is_short_and_names_nothing_twice(site: Path) -> None:
     text = (site / "index.html").read_text(encoding="utf-8")
-    entries = re.findall(r'toctree-l1[^>]*><a class="reference internal" href="[^"]*">([^<]*)<', text)
-    assert len(entries) > 40
-    assert len(set(entries)) == len(entries)
-    assert "README" in entries
-    assert "dubins-traffic" not in entries
+    bar = text.partition('<div class="sidebar-tree">')[2].partition("</aside>")[0]
+    links = re.findall(r'<a class="[^"]*reference internal" href="([^"#]*)', bar)
+    assert 30 < len(links) <= MOST_IN_THE_SIDEBAR
+    assert len(set(links)) == len(links)
+    assert [link for link in links if link.startswith("design/")] == []
+    assert re.findall(r'<p class="caption"[^>]*><span class="caption-text">([^<]*)<', bar) == HEADINGS
+
+
+def test_every_page_is_reached_from_the_first_one(pages: dict[Path, Page], site: Path) -> None:
+    """By links: those that the sidebar leaves out, design notes and pages about the code, too."""
+    first = site / "index.html"
+    met, left = {first}, [first]
+    while left:
+        path = left.pop()
+        found = {leads(path, link)[0] for link in pages[path].links if not urlsplit(link).scheme}
+        left += (found & pages.keys()) - met
+        met |= found & pages.keys()
+    shown = {
+        site / path.relative_to(ROOT / "docs").with_suffix(".html") for path in (ROOT / "docs").rglob("*.md")
+    }
+    assert shown - met == {site / "package.html"}
 
 
 def test_words_are_those_that_were_written(site: Path) -> None:

@@ -32,8 +32,19 @@ def rooms() -> set[str]:
 def test_the_index_names_every_page_and_only_those() -> None:
     named = set(re.findall(r"\]\(([\w./-]+\.md)\)", page("index.md")))
     pages = {path.relative_to(DOCS).as_posix() for path in DOCS.rglob("*.md")}
-    assert {name for name in named if not name.startswith("../")} == pages - {"index.md"}
+    notes = {name for name in pages if name.startswith("design/")} - {"design/index.md"}
+    assert {name for name in named if not name.startswith("../")} == pages - notes - {"index.md"}
     assert all((DOCS / name).exists() for name in named)
+
+
+def test_the_page_of_the_design_notes_names_each() -> None:
+    named = set(re.findall(r"^\| \[\d+\]\(([\w-]+\.md)\)", page("design/index.md"), re.MULTILINE))
+    assert named == {path.name for path in (DOCS / "design").glob("*.md")} - {"index.md"}
+
+
+def test_the_index_has_five_headings_and_reference() -> None:
+    headings = re.findall(r"^## (.*)$", page("index.md"), re.MULTILINE)
+    assert headings == ["Start", "The task", "Drive", "Evaluate", "Compete", "Reference"]
 
 
 def test_the_architecture_names_every_room() -> None:

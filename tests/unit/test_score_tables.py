@@ -137,7 +137,8 @@ def test_a_sheet_says_once_that_its_verdicts_say_little(capsys: pytest.CaptureFi
         tables.show(ScoreSheet((broken, broken, kept, scored())), json=json)
         told = capsys.readouterr().err
         assert told == (
-            "dubins-traffic: the assumption was broken in 2 of 3 trials: these verdicts say little\n"
+            "dubins-traffic: e-agents broke what is assumed of them (E1 to E6) in 2 of 3 trials: "
+            "these verdicts say little about the controller\n"
         )
         tables.show(ScoreSheet((broken, kept)), json=json)
         assert capsys.readouterr().err == ""
@@ -146,10 +147,12 @@ def test_a_sheet_says_once_that_its_verdicts_say_little(capsys: pytest.CaptureFi
 def test_the_notice_is_on_more_than_half() -> None:
     assert assumption_notice(0, 0) == ""
     assert assumption_notice(10, 20) == ""
+    broken = "e-agents broke what is assumed of them (E1 to E6) in"
     assert (
-        assumption_notice(11, 20) == "the assumption was broken in 11 of 20 trials: these verdicts say little"
+        assumption_notice(11, 20)
+        == f"{broken} 11 of 20 trials: these verdicts say little about the controller"
     )
-    assert assumption_notice(1, 1) == "the assumption was broken in 1 of 1 trial: this verdict says little"
+    assert assumption_notice(1, 1) == f"{broken} 1 of 1 trial: this verdict says little about the controller"
 
 
 # What counts
@@ -291,7 +294,9 @@ def test_the_page_of_a_report_says_that_its_verdicts_say_little(broken: int, tmp
     comparison, _ = campaign_of(tmp_path, *found)
     made = {"versions": {}, "campaign": "", "configurations": {}, "controllers": [], "code": ""}
     text = page(replace(comparison, metrics=()), made, {})
-    notice = "the assumption was broken in 3 of 4 trials: these verdicts say little"
+    notice = (
+        "e-agents broke what is assumed of them (E1 to E6) in 3 of 4 trials: these verdicts say little about"
+    )
     assert (notice in text) == (broken == 3)
     assert (
         text.index("<th>clean</th>")

@@ -101,10 +101,10 @@ def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
         excuse = verdict.excuse
         sensed = "within" if excuse.sensed else "beyond"
         first = f"{excuse.violation.car} broke {excuse.violation.rule} at {excuse.violation.time:.3f} s"
-        near = "each" if verdict.near else "not each"
+        near = "before each breach" if verdict.near else "not before every breach"
         part = f"{excuse.assumption} ({excuse.clause})"
         console.print(f"  excused by {part}: {first}, {sensed} the sensing radius", markup=False)
-        console.print(f"  {near} breach of the ego follows one near it", markup=False)
+        console.print(f"  {near} of the ego, a car near it had just broken a rule", markup=False)
     from dubins_traffic.scoring.margins import UNITS
 
     known = [(rule, value) for rule, value in verdict.robustness.items() if value is not None]

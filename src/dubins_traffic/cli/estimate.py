@@ -88,7 +88,7 @@ def _show(found: Probability) -> None:
             print(f"{found.left_out} of {found.trials} trials are left out: they ended by a fault before")
         if found.discarded:
             faults.tell(
-                f"{found.discarded} trials don't count: the assumption was broken before the ego broke anything"
+                f"{found.discarded} trials count as trials without the event: e-agents broke the assumption first"
             )
     else:
         print(f"{found.trials} trials in {len(found.runs)} runs of multilevel splitting")

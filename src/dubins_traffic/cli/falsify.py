@@ -231,8 +231,8 @@ def _show(found: Found, *, json: bool) -> None:
         return
     _table(found.coverage)
     print(
-        f"{found.trials} trials: {found.violated} broke a rule, {found.discarded} discarded since the assumption was "
-        f"broken, {found.faulty} ended by a fault; {len(found.cases)} kinds of failure"
+        f"{found.trials} trials: the ego broke a rule in {found.violated}, e-agents broke the assumption first in "
+        f"{found.discarded} (discarded), {found.faulty} ended by a fault; {len(found.cases)} kinds of failure"
     )
     for name, case in found.cases.items():
         print(f"{name}: {case.story.sentence}")

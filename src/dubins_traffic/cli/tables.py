@@ -24,7 +24,10 @@ Scores: TypeAlias = "Sequence[Score]"
 
 WIDTH = 80
 """Columns of a terminal into which a table fits, unless told otherwise."""
-NOTE = "Counted rounds rank controllers; ICRA 2016 counts samples (docs/scores.md)."
+NOTE = (
+    "Controllers are ranked by counted rounds, which are the rounds of clean trials.\n"
+    "ICRA 2016 is the score of that competition, and ranks nothing (docs/scores.md)."
+)
 """What stands below a table."""
 
 

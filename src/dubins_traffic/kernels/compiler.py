@@ -11,7 +11,7 @@ Nor is there code that unpacks Python's arguments one by one: an entry reads num
 Numba's front end, typing and writing LLVM's language, takes most of the time: `kernels.pipeline` has fewer steps,
 `kernels.frontend` finds things once, `kernels.elements` writes less.
 
-This rests on inner parts of Numba (`docs/design/015-two-tiers.md`); it is the builder's process alone that they are
+This rests on inner parts of Numba (`docs/design/030-speed.md`); it is the builder's process alone that they are
 changed in.
 """
 

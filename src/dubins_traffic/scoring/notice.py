@@ -17,7 +17,8 @@ def assumption_notice(broken: int, judged: int) -> str:
         return ""
     trials = "trial" if judged == 1 else "trials"
     verdicts = "this verdict says" if judged == 1 else "these verdicts say"
-    return f"the assumption was broken in {broken} of {judged} {trials}: {verdicts} little"
+    found = f"e-agents broke what is assumed of them (E1 to E6) in {broken} of {judged} {trials}"
+    return f"{found}: {verdicts} little about the controller"
 
 
 def fault_notice(ends: Mapping[str, int], trials: int, first: str) -> str:
