@@ -6,7 +6,6 @@ import time
 
 import numpy as np
 import pytest
-from benchmarks.monitors import monitors_of_a_task, updates_per_second
 
 from dubins_traffic.logic.automaton import FALSE, PRESUMABLY_FALSE, PRESUMABLY_TRUE, TRUE
 from dubins_traffic.logic.formula import FormulaError
@@ -179,10 +178,3 @@ def test_verdicts_before_the_first_frame() -> None:
     monitors = Monitors({"t": parse("a | !a"), "f": parse("a & !a"), "g": parse("[] a")}, ("a",), 1.0)
     monitors.reset(1)
     assert monitors.verdicts.tolist() == [[TRUE, FALSE, PRESUMABLY_TRUE]]
-
-
-@pytest.mark.parametrize("trials", [1, 64])
-def test_ten_million_updates_a_second_of_one_trials_whole_task(trials: int) -> None:
-    monitors, width = monitors_of_a_task()
-    assert monitors.tables > 100
-    assert updates_per_second(monitors, width, trials) >= 1e7
