@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.rows import TOGETHER, copy_together
+from dubins_traffic.cars.clip_and_move import TOGETHER, copy_together
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline, jit_look
