@@ -166,7 +166,7 @@ def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: 
         duration = draw_duration(DURATION_BOUNDS, Draws(seed, trial, Stream.DURATION))
     return Instance(
         problem=problem,
-        starts=tuple(draw_starts(areas_of(ground), ground, wishes, Draws(seed, trial, Stream.STARTS))),
+        starts=tuple(draw_starts(areas_of(ground), car, wishes, Draws(seed, trial, Stream.STARTS))),
         duration=duration,
         e_agents=agents,
         seed=seed,

@@ -10,7 +10,6 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from itertools import islice
-from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.state import Pose
@@ -24,14 +23,21 @@ from dubins_traffic.problem.kinds import KEEP_RULES, loops
 from dubins_traffic.problem.obstructions import check_obstructions
 from dubins_traffic.problem.overlap import Shape, obstacle_shape, overlap
 from dubins_traffic.problem.preconditions import check_demands
-from dubins_traffic.problem.starts import Areas, Ground, Wish, areas_of, check_given, draw_starts
+from dubins_traffic.problem.starts import (
+    Areas,
+    Ground,
+    Lots,
+    Wish,
+    areas_of,
+    check_given,
+    draw_starts,
+    lots,
+    place_cars,
+)
 from dubins_traffic.roads.clearance import LEAST_RADIUS, SEGMENT_SLACK
 from dubins_traffic.roads.formats.rnd import grid_segments
 from dubins_traffic.roads.generate import random_network, thinned_grid
 from dubins_traffic.roads.network import RoadNetwork
-
-if TYPE_CHECKING:
-    from dubins_traffic.problem.starts import Lots
 
 TOGETHER = 64
 """Number of instances that are drawn at a time."""
@@ -69,7 +75,7 @@ def draw(configuration: Configuration, seed: int = 0, trial: int = 0) -> Instanc
 def draw_many(configuration: Configuration, seed: int, trials: Iterable[int]) -> Iterator[Instance]:
     """Yield the instances that `draw` returns for the numbers `trials`, much faster.
 
-    It uses compiled code. The parameters and errors are those of `draw`; an error is raised when its trial is reached.
+    The parameters and errors are those of `draw`; an error is raised when its trial is reached.
     """
     numbers = iter(trials)
     while some := [int(trial) for trial in islice(numbers, TOGETHER)]:
@@ -139,9 +145,7 @@ class Recipe:
         return self._instance(site, seed, trial, None)
 
     def draw_many(self, seed: int, trials: Sequence[int]) -> Iterator[Instance]:
-        """Yield the instances of some trials, with compiled code; the same as those of `draw`, bit for bit."""
-        from dubins_traffic.problem.starts import place_cars
-
+        """Yield the instances of some trials, which are those of `draw`; trials on one site are drawn in one call."""
         k = 0
         while k < len(trials):
             site = self._site_of(seed, trials[k])
@@ -169,9 +173,8 @@ class Recipe:
         check_formulas(problem, self._names)
         check_obstructions(problem)
         if starts is None:
-            starts = draw_starts(
-                self._areas(site), site.ground, site.wishes, Draws(seed, trial, Stream.STARTS)
-            )
+            draws = Draws(seed, trial, Stream.STARTS)
+            starts = draw_starts(self._areas(site), self._car, site.wishes, draws)
         return Instance(
             problem=problem,
             starts=tuple(starts),
@@ -218,10 +221,8 @@ class Recipe:
         return areas
 
     def _lots(self, site: Site) -> Lots:
-        from dubins_traffic.problem.starts import lots
-
         if site.lots is None:
-            site.lots = lots(site.ground, self._areas(site).outside, site.wishes)
+            site.lots = lots(self._car, (self._areas(site).outside,), site.wishes)
         return site.lots
 
     def _goals(self, network: RoadNetwork, seed: int, trial: int) -> tuple[tuple[float, float], ...]:

@@ -1,13 +1,14 @@
 """Where the cars of an instance start.
 
 Free places on right lanes (`Places`) are found exactly, not by trial and error, so that "does not fit" is a fact. All
-bits follow from + - * / and square roots in a fixed order. `draw_starts` draws the starts of one trial and needs no
-compiler; `place_cars` those of many, compiled, in the usual case that all cars fit, from the same random numbers.
+bits follow from + - * / and square roots in a fixed order. One kernel, `place_trials`, places the cars of one trial or
+many.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from copy import deepcopy
 from itertools import chain
 from math import ceil, floor, sqrt
 from typing import NamedTuple
@@ -36,7 +37,7 @@ TIGHT = 0.1
 NO_CAR = np.uint64(0xFFFFFFFF)
 """Stands where a running trial's random numbers have a car (`kernels.philox.Draws`)."""
 CUTS = 24
-"""Number of intervals per car for which there is scratch; a trial that needs more is drawn in plain Python."""
+"""Number of intervals per car for which there is scratch; of many trials one that needs more is drawn alone."""
 
 
 class Lines(NamedTuple):
@@ -67,11 +68,6 @@ class Lines(NamedTuple):
     def points(self, lane: Ints, along: Floats) -> tuple[Floats, Floats]:
         """Return x and y of the points `along` metres down the lines of `lane` (K,)."""
         return self.ax[lane] + along * self.tx[lane], self.ay[lane] + along * self.ty[lane]
-
-    def pose(self, lane: int, along: float) -> Pose:
-        """Return the pose `along` metres down a line, headed along it."""
-        tx, ty = float(self.tx[lane]), float(self.ty[lane])
-        return Pose(float(self.ax[lane]) + along * tx, float(self.ay[lane]) + along * ty, tx, ty)
 
 
 def chord(along: Floats, left: Floats, radius: float) -> tuple[Floats, Floats]:
@@ -135,24 +131,11 @@ class Places:
         lane = np.arange(network.lanes)
         self._free = Intervals(lane, np.zeros(len(lane)), np.repeat(network.runs.length, 2))
 
-    @property
-    def count(self) -> int:
-        """Number of lanes of the network."""
-        return self._network.lanes
-
     def copy(self) -> Places:
         """Return an independent copy."""
         twin = object.__new__(Places)
         twin.__dict__.update(self.__dict__)
         return twin
-
-    def block(self, x: float, y: float, radius: float) -> None:
-        """Remove all places closer than `radius` to (x, y)."""
-        radius += SLACK
-        index = self._around(x, y, radius)
-        own = self._free.select(index)
-        along, left = self._lines.relative(own.lane, x, y)
-        self._put(index, _cut(own, *chord(along, left, radius)))
 
     def block_shape(self, shape: Shape, clearance: float) -> None:
         """Remove all places closer than `clearance` to a shape, or inside it."""
@@ -177,38 +160,9 @@ class Places:
         hit = low < high
         self._free = _subtract(self._free, Intervals(lane[hit], low[hit], high[hit]))
 
-    def choose(self, draws: Draws, lanes: Collection[int] | None = None) -> tuple[int, float] | None:
-        """Return a lane and the metres along it, uniform over all free places (of `lanes`), or None."""
-        lane, low, high = self._free
-        width = high - low
-        if lanes is not None:
-            width = np.where(np.isin(lane, list(lanes)), width, 0.0)
-        ends = np.cumsum(width)
-        if not len(ends) or not ends[-1] > 0.0:
-            return None
-        pick = draws.uniform(0.0, float(ends[-1]))
-        k = min(int(np.searchsorted(ends, pick, side="right")), int(np.flatnonzero(width > 0.0)[-1]))
-        along = float(low[k]) + (pick - float(ends[k] - width[k]))
-        return int(lane[k]), min(max(along, float(low[k])), float(high[k]))
-
-    def first(self, order: Ints, lanes: Collection[int] | None = None) -> tuple[int, float] | None:
-        """Return the beginning of the first free place, lanes taken by their rank in `order`, or None."""
-        lane, low, _ = self._free
-        if lanes is not None:
-            allowed = np.isin(lane, list(lanes))
-            lane, low = lane[allowed], low[allowed]
-        if not len(lane):
-            return None
-        k = int(np.argmin(order[lane]))
-        return int(lane[k]), float(low[k])
-
     def tables(self) -> tuple[Floats, Intervals]:
         """Return start and direction of each right lane's centre line, (L, 4), and the free intervals."""
         return np.ascontiguousarray(np.stack(self._lines, axis=-1)), self._free
-
-    def pose(self, lane: int, along: float) -> Pose:
-        """Return the pose `along` metres down a right lane, headed with it."""
-        return self._lines.pose(lane, along)
 
     def _around(self, x: float, y: float, radius: float) -> Ints:
         """Return the numbers of the intervals of all lanes that may come closer than `radius` to (x, y)."""
@@ -363,7 +317,70 @@ def areas_of(ground: Ground) -> Areas:
     return Areas(free, outside)
 
 
-def draw_starts(areas: Areas, ground: Ground, wishes: Sequence[Wish], draws: Draws) -> list[Pose]:
+def gap_radius(car: Car, gap: float = ROOMY) -> float:
+    """Return the least distance of the centres of two cars, metres, that leaves `gap` between their bodies."""
+    return 2.0 * car.body.reach + gap * (car.w / 0.3)
+
+
+class Lots(NamedTuple):
+    """Where the cars of trials on one ground may stand.
+
+    `line` (L, 4): start and direction of each lane's centre line; `lane`, `low`, `high` (K,): the free intervals of
+    the lanes, in order, one area after another; `first` (A + 1,): where each area begins among these; `given` (G, 2):
+    positions of the cars whose starts are given; `order` (D,): the others, in the order in which they are drawn;
+    `allowed` (D, L): where each of these may be, or (0, 0) for all lanes; `radius`: how far centres are apart, metres.
+    """
+
+    line: Floats
+    lane: Ints
+    low: Floats
+    high: Floats
+    first: Ints
+    given: Floats
+    order: Ints
+    allowed: npt.NDArray[np.bool_]
+    radius: float
+
+
+class Room(NamedTuple):
+    """Scratch for one trial: for each area two lists of intervals that take turns.
+
+    `lane` (A, 2, K) and `span` (A, 2, K, 2): lane and ends (m) of each interval; `count` (A,): how many there are;
+    `ends` (K,): what is free up to the end of each, m.
+    """
+
+    lane: Ints
+    span: Floats
+    count: Ints
+    ends: Floats
+
+
+def lots(car: Car, areas: Sequence[Places], wishes: Sequence[Wish], gap: float = ROOMY) -> Lots:
+    """Return where cars with `wishes` may stand: in the first of the `areas` that has room, `gap` metres apart."""
+    free = [area.tables() for area in areas]
+    line = free[0][0]
+    given = [(wish.pose.x, wish.pose.y) for wish in wishes if wish.pose is not None]
+    drawn = [n for n, wish in enumerate(wishes) if wish.pose is None]
+    order = sorted(drawn, key=lambda n: wishes[n].lanes is None)
+    choosy = any(wish.lanes is not None for wish in wishes)
+    allowed = np.ones((len(order), len(line)) if choosy else (0, 0), dtype=np.bool_)
+    for k, n in enumerate(order):
+        own = wishes[n].lanes
+        if own is not None:
+            allowed[k] = False
+            allowed[k, list(own)] = True
+    return Lots(
+        line,
+        *(np.concatenate(columns) for columns in zip(*(own for _, own in free), strict=True)),
+        np.concatenate([[0], np.cumsum([len(own.lane) for _, own in free])]).astype(np.int64),
+        np.array(given, dtype=np.float64).reshape(len(given), 2),
+        np.array(order, dtype=np.int64),
+        allowed,
+        gap_radius(car, gap) + SLACK,
+    )
+
+
+def draw_starts(areas: Areas, car: Car, wishes: Sequence[Wish], draws: Draws) -> list[Pose]:
     """Return the start poses of all cars.
 
     Starts that are not given are drawn uniformly over the right lanes' centre lines, headed with the lane, with bodies
@@ -375,18 +392,25 @@ def draw_starts(areas: Areas, ground: Ground, wishes: Sequence[Wish], draws: Dra
     InputError
         If the cars don't fit; says how many do.
     """
-    poses = {n: wish.pose for n, wish in enumerate(wishes) if wish.pose is not None}
+    poses = [wish.pose for wish in wishes if wish.pose is not None]
     if len(poses) == len(wishes):
-        return [poses[n] for n in range(len(wishes))]
+        return poses
     free, outside = areas
     best = 0
-    for some in ((outside,), (outside, free)):
-        for gap in (ROOMY, TIGHT) if len(some) == 1 else (TIGHT,):
-            for packed in (False, True):
-                found = _attempt(some, gap, packed, ground.car, wishes, draws)
-                if len(found) == len(wishes):
-                    return [found[n] for n in range(len(wishes))]
-                best = max(best, len(found))
+    for some, gap in (((outside,), ROOMY), ((outside,), TIGHT), ((outside, free), TIGHT)):
+        own = lots(car, some, wishes, gap)
+        count = len(own.order)
+        for packed in (False, True):
+            ranks = np.array(draws.shuffled(len(own.line)) if packed else (), dtype=np.int64)
+            ahead = deepcopy(draws)
+            shares = np.array([[0.0 if packed else ahead.uniform() for _ in range(count)]])
+            rows, placed = _place(own, shares, ranks)
+            done = int(placed[0])
+            if done == count:
+                return _starts(own, wishes, rows[0])
+            for _ in range(0 if packed else done):
+                draws.uniform()
+            best = max(best, len(own.given) + done)
     raise InputError(
         f"only {best} of {len(wishes)} cars fit on the road network",
         field="e-agents",
@@ -395,33 +419,201 @@ def draw_starts(areas: Areas, ground: Ground, wishes: Sequence[Wish], draws: Dra
     )
 
 
-def gap_radius(car: Car, gap: float = ROOMY) -> float:
-    """Return the least distance of the centres of two cars, metres, that leaves `gap` between their bodies."""
-    return 2.0 * car.body.reach + gap * (car.w / 0.3)
+def place_cars(
+    own: Lots, wishes: Sequence[Wish], seed: int, trials: Sequence[int], stream: int
+) -> list[list[Pose] | None]:
+    """Return the start poses that `draw_starts` draws for each trial; None where it has to try more than once."""
+    shares = np.zeros((len(trials), len(own.order)))
+    draw_shares(np.uint64(seed), np.array(trials, dtype=np.int64), stream, shares)
+    poses, placed = _place(own, shares, np.zeros(0, dtype=np.int64))
+    return [
+        _starts(own, wishes, rows) if done == len(own.order) else None
+        for rows, done in zip(poses, placed.tolist(), strict=True)
+    ]
 
 
-def _attempt(
-    areas: Sequence[Places], gap: float, packed: bool, car: Car, wishes: Sequence[Wish], draws: Draws
-) -> dict[int, Pose]:
-    """Place cars in turn, in the first area that has room for each, until one finds none."""
-    own = [area.copy() for area in areas]
-    radius = gap_radius(car, gap)
-    order = np.array(draws.shuffled(areas[0].count), dtype=np.int64) if packed else None
-    found = {n: wish.pose for n, wish in enumerate(wishes) if wish.pose is not None}
-    for pose in found.values():
-        for area in own:
-            area.block(pose.x, pose.y, radius)
-    drawn = [n for n, wish in enumerate(wishes) if wish.pose is None]
-    for n in sorted(drawn, key=lambda n: wishes[n].lanes is None):
-        lanes = wishes[n].lanes
-        spots = (a.choose(draws, lanes) if order is None else a.first(order, lanes) for a in own)
-        spot = next((spot for spot in spots if spot is not None), None)
-        if spot is None:
+def _starts(own: Lots, wishes: Sequence[Wish], rows: Floats) -> list[Pose]:
+    """Return the poses of all cars: as given, and as drawn."""
+    whole = [wish.pose for wish in wishes]
+    for n, row in zip(own.order.tolist(), rows.tolist(), strict=True):
+        whole[n] = Pose._make(row)
+    return [pose for pose in whole if pose is not None]
+
+
+def _place(own: Lots, shares: Floats, ranks: Ints) -> tuple[Floats, Ints]:
+    """Return what `place_trials` writes; a trial alone gets the scratch that it needs, of many some may go without."""
+    trials, cars = shares.shape
+    poses, placed = np.zeros((trials, cars, 4)), np.zeros(trials, dtype=np.int64)
+    areas, size = len(own.first) - 1, len(own.lane) + CUTS * (cars + len(own.given))
+    while True:
+        lane, span = np.zeros((areas, 2, size), dtype=np.int64), np.zeros((areas, 2, size, 2))
+        room = Room(lane, span, np.zeros(areas, dtype=np.int64), np.zeros(size))
+        place_trials(own, shares, ranks, room, poses, placed)
+        if trials != 1 or placed[0] >= 0:
+            return poses, placed
+        size *= 2
+
+
+@jit
+def draw_shares(seed: np.uint64, trials: Ints, stream: int, shares: Floats) -> None:
+    """Draw the random numbers of the cars of all trials, those with which a stream of `Draws` begins.
+
+    Parameters
+    ----------
+    seed : uint64
+        The seed of all random numbers.
+    trials : (B,) int64
+        Numbers of the trials.
+    stream : int
+        Number of the draw in the counter of random numbers.
+    shares : (B, D) float64
+        Set to a number in [0, 1) for each car that is drawn.
+    """
+    for b in range(trials.shape[0]):
+        for k in range(shares.shape[1]):
+            words = block(seed, trials[b], NO_CAR, k // 2, stream)
+            first = words[0] if k % 2 == 0 else words[2]
+            second = words[1] if k % 2 == 0 else words[3]
+            shares[b, k] = np.float64((first << UP) | (second >> DOWN)) * GRID
+
+
+@jit
+def place_trials(own: Lots, shares: Floats, ranks: Ints, room: Room, poses: Floats, placed: Ints) -> None:
+    """Place the cars of all trials, one after another, each in the first area that has room, until one finds none.
+
+    Parameters
+    ----------
+    own : Lots
+        What the trials have in common.
+    shares : (B, D) float64
+        Where a car is to stand, as a share of all that is free then, a number in [0, 1).
+    ranks : (L,) int64, or empty
+        Where given, cars are packed instead: each at the beginning of what is free, lanes taken by rank.
+    room : Room
+        Scratch for one trial.
+    poses : (B, D, 4) float64
+        Set to x, y (m), cos, sin of each car that is drawn.
+    placed : (B,) int64
+        Set to the number of cars that have found a place, -1 if the scratch is too small to tell.
+    """
+    cars = own.order.shape[0]
+    for b in range(shares.shape[0]):
+        for a in range(room.count.shape[0]):
+            start = own.first[a]
+            room.count[a] = own.first[a + 1] - start
+            for k in range(room.count[a]):
+                room.lane[a, 0, k] = own.lane[start + k]
+                room.span[a, 0, k, 0] = own.low[start + k]
+                room.span[a, 0, k, 1] = own.high[start + k]
+        side = 0
+        done = 0
+        for g in range(own.given.shape[0]):
+            if done == 0 and not _cut_out(own, own.given[g, 0], own.given[g, 1], side, room):
+                done = -1
+            side = 1 - side
+        placed[b] = done
+        while 0 <= placed[b] < cars:
+            car = placed[b]
+            area, spot, along = -1, -1, 0.0
+            while spot < 0 and area + 1 < room.count.shape[0]:
+                area += 1
+                if ranks.shape[0] > 0:
+                    spot, along = _first(own, car, ranks, area, side, room)
+                else:
+                    spot, along = _choose(own, car, shares[b, car], area, side, room)
+            if spot < 0:
+                break
+            line, pose = own.line[room.lane[area, side, spot]], poses[b, car]
+            pose[0], pose[1] = line[0] + along * line[2], line[1] + along * line[3]
+            pose[2], pose[3] = line[2], line[3]
+            placed[b] = car + 1
+            if car + 1 < cars and not _cut_out(own, pose[0], pose[1], side, room):
+                placed[b] = -1
+            side = 1 - side
+
+
+@jit
+def _first(own: Lots, car: int, ranks: Ints, area: int, side: int, room: Room) -> tuple[int, float]:
+    """Return the first interval of the lane of lowest rank that a car may take, and its beginning; -1 if none is."""
+    best = -1
+    for k in range(room.count[area]):
+        lane = room.lane[area, side, k]
+        if own.allowed.shape[0] > 0 and not own.allowed[car, lane]:
+            continue
+        if best < 0 or ranks[lane] < ranks[room.lane[area, side, best]]:
+            best = k
+    if best < 0:
+        return -1, 0.0
+    return best, room.span[area, side, best, 0]
+
+
+@jit
+def _choose(own: Lots, car: int, share: float, area: int, side: int, room: Room) -> tuple[int, float]:
+    """Return an interval and the metres along its lane at a share of all that is free; -1 if nothing is."""
+    lane, span, ends = room.lane[area, side], room.span[area, side], room.ends
+    total = 0.0
+    last = -1
+    for k in range(room.count[area]):
+        width = span[k, 1] - span[k, 0]
+        if own.allowed.shape[0] > 0 and not own.allowed[car, lane[k]]:
+            width = 0.0
+        total += width
+        ends[k] = total
+        if width > 0.0:
+            last = k
+    if not total > 0.0:
+        return -1, 0.0
+    pick = total * share
+    chosen = last
+    for k in range(last):
+        if ends[k] > pick:
+            chosen = k
             break
-        pose = found[n] = own[0].pose(*spot)
-        for area in own:
-            area.block(pose.x, pose.y, radius)
-    return found
+    width = span[chosen, 1] - span[chosen, 0]
+    if own.allowed.shape[0] > 0 and not own.allowed[car, lane[chosen]]:
+        width = 0.0
+    along = span[chosen, 0] + (pick - (ends[chosen] - width))
+    return chosen, min(max(along, span[chosen, 0]), span[chosen, 1])
+
+
+@jit
+def _cut_out(own: Lots, x: float, y: float, side: int, room: Room) -> bool:
+    """Take a disc out of the intervals of all areas; return whether the scratch was large enough."""
+    square = own.radius * own.radius
+    for a in range(room.count.shape[0]):
+        lane, span = room.lane[a, side], room.span[a, side]
+        new_lane, new_span = room.lane[a, 1 - side], room.span[a, 1 - side]
+        total = 0
+        for k in range(room.count[a]):
+            if total + 2 > new_lane.shape[0]:
+                return False
+            line = own.line[lane[k]]
+            rx = x - line[0]
+            ry = y - line[1]
+            along = rx * line[2] + ry * line[3]
+            left = line[2] * ry - line[3] * rx
+            rest = square - left * left
+            half = sqrt(max(rest, 0.0))
+            low = along - half
+            high = along + half
+            if rest > 0.0 and low < span[k, 1] and high > span[k, 0] and low < high:
+                if low >= span[k, 0]:
+                    new_lane[total] = lane[k]
+                    new_span[total, 0] = span[k, 0]
+                    new_span[total, 1] = low
+                    total += 1
+                if high <= span[k, 1]:
+                    new_lane[total] = lane[k]
+                    new_span[total, 0] = high
+                    new_span[total, 1] = span[k, 1]
+                    total += 1
+            else:
+                new_lane[total] = lane[k]
+                new_span[total, 0] = span[k, 0]
+                new_span[total, 1] = span[k, 1]
+                total += 1
+        room.count[a] = total
+    return True
 
 
 def check_given(ground: Ground, names: Sequence[str], wishes: Sequence[Wish]) -> None:
@@ -452,203 +644,3 @@ def _overlap_error(name: str, wish: Wish, other: str) -> InputError:
         value=[pose.x, pose.y, pose.theta] if pose else None,
         expected="a start clear of other cars and of obstacles",
     )
-
-
-class Room(NamedTuple):
-    """Scratch for one trial, two lists of intervals that take turns.
-
-    `lane` (2, K) and `span` (2, K, 2): lane and ends (m) of each interval; `ends` (K,): what is free up to its end, m.
-    """
-
-    lane: Ints
-    span: Floats
-    ends: Floats
-
-
-class Lots(NamedTuple):
-    """Where the cars of trials on one ground may stand.
-
-    `line` (L, 4): start and direction of each lane's centre line; `lane`, `low`, `high` (K,): the free intervals of
-    the lanes, in order; `given` (G, 2): positions of the cars whose starts are given; `order` (D,): the others, in the
-    order in which they are drawn; `allowed` (D, L): where each of these may be, or (0, 0) for all lanes; `radius`: how
-    far centres are apart, metres.
-    """
-
-    line: Floats
-    lane: Ints
-    low: Floats
-    high: Floats
-    given: Floats
-    order: Ints
-    allowed: npt.NDArray[np.bool_]
-    radius: float
-
-
-def lots(ground: Ground, outside: Places, wishes: Sequence[Wish]) -> Lots:
-    """Return the lots of a ground, of which `outside` is free, for cars with `wishes`."""
-    line, intervals = outside.tables()
-    given = [(wish.pose.x, wish.pose.y) for wish in wishes if wish.pose is not None]
-    drawn = [n for n, wish in enumerate(wishes) if wish.pose is None]
-    order = sorted(drawn, key=lambda n: wishes[n].lanes is None)
-    choosy = any(wish.lanes is not None for wish in wishes)
-    allowed = np.ones((len(order), len(line)) if choosy else (0, 0), dtype=np.bool_)
-    for k, n in enumerate(order):
-        own = wishes[n].lanes
-        if own is not None:
-            allowed[k] = False
-            allowed[k, list(own)] = True
-    return Lots(
-        line,
-        *intervals,
-        np.array(given, dtype=np.float64).reshape(len(given), 2),
-        np.array(order, dtype=np.int64),
-        allowed,
-        gap_radius(ground.car) + SLACK,
-    )
-
-
-def place_cars(
-    own: Lots, wishes: Sequence[Wish], seed: int, trials: Sequence[int], stream: int
-) -> list[list[Pose] | None]:
-    """Return the start poses of the cars of each trial; None if they don't fit with the full gap."""
-    poses = np.zeros((len(trials), len(own.order), 4))
-    placed = np.zeros(len(trials), dtype=np.int64)
-    size = len(own.lane) + CUTS * len(wishes)
-    room = Room(np.zeros((2, size), dtype=np.int64), np.zeros((2, size, 2)), np.zeros(size))
-    place_trials(np.uint64(seed), np.array(trials, dtype=np.int64), stream, own, room, poses, placed)
-    base = [wish.pose for wish in wishes]
-    order: list[int] = own.order.tolist()
-    found: list[list[Pose] | None] = []
-    for rows, done in zip(poses.tolist(), placed.tolist(), strict=True):
-        if done < len(order):
-            found.append(None)
-            continue
-        whole = list(base)
-        for n, row in zip(order, rows, strict=True):
-            whole[n] = Pose._make(row)
-        found.append([pose for pose in whole if pose is not None])
-    return found
-
-
-@jit
-def place_trials(
-    seed: np.uint64, trials: Ints, stream: int, own: Lots, room: Room, poses: Floats, placed: Ints
-) -> None:
-    """Place the cars of all trials.
-
-    Parameters
-    ----------
-    seed : uint64
-        The seed of all random numbers.
-    trials : (B,) int64
-        Numbers of the trials.
-    stream : int
-        Number of the draw in the counter of random numbers.
-    own : Lots
-        What the trials have in common.
-    room : Room
-        Scratch for one trial.
-    poses : (B, D, 4) float64
-        Set to x, y (m), cos, sin of each car that is drawn.
-    placed : (B,) int64
-        Set to the number of cars that have found a place.
-    """
-    for b in range(trials.shape[0]):
-        count = own.lane.shape[0]
-        for k in range(count):
-            room.lane[0, k] = own.lane[k]
-            room.span[0, k, 0] = own.low[k]
-            room.span[0, k, 1] = own.high[k]
-        side = 0
-        for g in range(own.given.shape[0]):
-            count = _cut_out(own, own.given[g, 0], own.given[g, 1], side, count, room)
-            side = 1 - side
-            if count < 0:
-                break
-        for k in range(own.order.shape[0]):
-            if count < 0:
-                break
-            words = block(seed, trials[b], NO_CAR, k // 2, stream)
-            first = words[0] if k % 2 == 0 else words[2]
-            second = words[1] if k % 2 == 0 else words[3]
-            share = np.float64((first << UP) | (second >> DOWN)) * GRID
-            spot, along = _choose(own, k, share, side, count, room)
-            if spot < 0:
-                break
-            line, pose = own.line[room.lane[side, spot]], poses[b, k]
-            pose[0], pose[1] = line[0] + along * line[2], line[1] + along * line[3]
-            pose[2], pose[3] = line[2], line[3]
-            placed[b] = k + 1
-            count = _cut_out(own, pose[0], pose[1], side, count, room)
-            side = 1 - side
-
-
-@jit
-def _choose(own: Lots, car: int, share: float, side: int, count: int, room: Room) -> tuple[int, float]:
-    """Return an interval and the metres along its lane at a share of all that is free; -1 if nothing is."""
-    lane, span, ends = room.lane[side], room.span[side], room.ends
-    total = 0.0
-    last = -1
-    for k in range(count):
-        width = span[k, 1] - span[k, 0]
-        if own.allowed.shape[0] > 0 and not own.allowed[car, lane[k]]:
-            width = 0.0
-        total += width
-        ends[k] = total
-        if width > 0.0:
-            last = k
-    if not total > 0.0:
-        return -1, 0.0
-    pick = total * share
-    chosen = last
-    for k in range(last):
-        if ends[k] > pick:
-            chosen = k
-            break
-    width = span[chosen, 1] - span[chosen, 0]
-    if own.allowed.shape[0] > 0 and not own.allowed[car, lane[chosen]]:
-        width = 0.0
-    along = span[chosen, 0] + (pick - (ends[chosen] - width))
-    return chosen, min(max(along, span[chosen, 0]), span[chosen, 1])
-
-
-@jit
-def _cut_out(own: Lots, x: float, y: float, side: int, count: int, room: Room) -> int:
-    """Take a disc out of the intervals; return how many there are then, -1 if there is no room for them."""
-    lane, span, new_lane, new_span = (
-        room.lane[side],
-        room.span[side],
-        room.lane[1 - side],
-        room.span[1 - side],
-    )
-    total = 0
-    square = own.radius * own.radius
-    for k in range(count):
-        if total + 2 > new_lane.shape[0]:
-            return -1
-        line = own.line[lane[k]]
-        rx = x - line[0]
-        ry = y - line[1]
-        along = rx * line[2] + ry * line[3]
-        left = line[2] * ry - line[3] * rx
-        rest = square - left * left
-        half = sqrt(max(rest, 0.0))
-        low = along - half
-        high = along + half
-        if rest > 0.0 and low < span[k, 1] and high > span[k, 0] and low < high:
-            if low >= span[k, 0]:
-                new_lane[total] = lane[k]
-                new_span[total, 0] = span[k, 0]
-                new_span[total, 1] = low
-                total += 1
-            if high <= span[k, 1]:
-                new_lane[total] = lane[k]
-                new_span[total, 0] = high
-                new_span[total, 1] = span[k, 1]
-                total += 1
-        else:
-            new_lane[total] = lane[k]
-            new_span[total, 0] = span[k, 0]
-            new_span[total, 1] = span[k, 1]
-            total += 1
-    return total

@@ -17,11 +17,14 @@ import numpy.typing as npt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import angle, angles, sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.formats.rnd import Segment
 
 Point = tuple[float, float]
+Segment = tuple[float, float, float, float]
+"""Ends x0, y0, x1, y1, lattice units; whole numbers are integers."""
 Corner = tuple[float, float, float]
 """x, y and the radius of the arc that rounds it, lattice units."""
+Corners = tuple[Corner, ...]
+"""The corners of a segment that bends."""
 TIGHT = 1e-9
 """Tangents may overlap by this share of the side; a line of less is left out."""
 STRAIGHT = 1e-12

@@ -13,8 +13,8 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.roads.chains import Piece, Point, chain, pieces
-from dubins_traffic.roads.formats.rnd import Corners, Segment, extent
+from dubins_traffic.roads.chains import Corners, Piece, Point, Segment, chain, pieces
+from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.room import LARGEST_DEGREE
 from dubins_traffic.roads.surface import covered, pairs
 

@@ -15,6 +15,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.roads.chains import Corners
 from dubins_traffic.roads.checks import LARGEST_DEGREE, meetings
 from dubins_traffic.roads.clearance import (
     LEAST_RADIUS,
@@ -26,7 +27,7 @@ from dubins_traffic.roads.clearance import (
     clearances,
     tight,
 )
-from dubins_traffic.roads.formats.rnd import Corners, extent
+from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.network import RoadNetwork
 
 STREAM = 1

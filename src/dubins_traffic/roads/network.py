@@ -21,12 +21,12 @@ from dubins_traffic.display import Pictured, count
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.chains import Chains, Runs, sides, turned
+from dubins_traffic.roads.chains import Chains, Corners, Runs, Segment, sides, turned
 from dubins_traffic.roads.checks import check
 from dubins_traffic.roads.formats import registry as formats
 from dubins_traffic.roads.formats import rnd
 from dubins_traffic.roads.formats.registry import MapFormat
-from dubins_traffic.roads.formats.rnd import Corners, Segment, write_json, write_lines
+from dubins_traffic.roads.formats.rnd import write_json, write_lines
 from dubins_traffic.roads.surface import Surface
 
 Point = tuple[float, float]

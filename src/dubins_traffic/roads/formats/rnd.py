@@ -17,11 +17,8 @@ from numbers import Integral, Real
 from typing import Any, NamedTuple, TypeGuard, cast
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.roads.chains import Corners, Segment
 
-Segment = tuple[float, float, float, float]
-"""Ends x0, y0, x1, y1; whole numbers are integers."""
-Corners = tuple[tuple[float, float, float], ...]
-"""The corners x, y, radius of a segment that bends."""
 LARGEST_POINT = 1_000_000
 LARGEST_GRID = 100_000
 LENGTHS = (1e-3, 1e6)
