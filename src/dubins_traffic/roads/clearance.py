@@ -149,17 +149,16 @@ def clearance_faults(
         )
     found = cast(Tight, network.known[least])
     for s in found.short.tolist():
-        faults.append(_too_little("too short", s, float(network.lengths[s]), least.length))
+        faults.append(_fault("too short", s, float(network.lengths[s]), f"at least {least.length:.6g} m"))
     for v, other in _couples(found.close):
         s = int(np.flatnonzero((ends == v).any(axis=1))[0])
         gap = float(_norm(points[v] - points[other]))
         problem = f"intersections {list(names[v])} and {list(names[other])} are too close"
-        faults.append(_too_little(problem, s, gap, least.apart))
+        faults.append(_fault(problem, s, gap, f"at least {least.apart:.6g} m"))
     for v, s in _couples(found.beside):
         gap = float(np.sqrt(network.surface.distance2(points[v, 0], points[v, 1], np.array(s))))
-        faults.append(
-            _too_little(f"intersection {list(names[v])} is too close to the road", s, gap, least.aside)
-        )
+        problem = f"intersection {list(names[v])} is too close to the road"
+        faults.append(_fault(problem, s, gap, f"at least {least.aside:.6g} m"))
     for v, first, second in found.sharp.tolist():
         faults.append(_sharp_fault(network, v, first, second, least.cosine))
     return faults
@@ -182,10 +181,6 @@ def _distinct(rows: list[Ints]) -> Ints:
 
 def _couples(rows: Ints) -> list[tuple[int, int]]:
     return [(int(row[0]), int(row[1])) for row in rows]
-
-
-def _too_little(problem: str, s: int, value: float, least: float) -> InputError:
-    return InputError(problem, field=f"segments[{s}]", value=value, expected=f"at least {least:.6g} m")
 
 
 def _sharp_fault(network: RoadNetwork, v: int, first: int, second: int, cosine: float) -> InputError:

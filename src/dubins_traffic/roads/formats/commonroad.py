@@ -55,8 +55,31 @@ class CommonRoad(WrittenFormat):
         return with_hints(lanelet_map(lanelets), text, file).checked(file)
 
     def write_map(self, made: RoadMap) -> str:
-        """Return the text of a map."""
-        return write_commonroad(made)
+        """Return the text of a scenario without cars; an intersection for each junction of three roads or more."""
+        root = Element("commonRoad", commonRoadVersion="2020a", benchmarkID="USA_DubinsTraffic-1_1_T-1")
+        root.attrib |= {
+            "date": "2016-05-16",
+            "author": "",
+            "affiliation": "",
+            "source": "dubins-traffic",
+            "timeStepSize": "0.1",
+        }
+        location = SubElement(root, "location")
+        for tag, value in (("geoNameId", "-999"), ("gpsLatitude", "999"), ("gpsLongitude", "999")):
+            SubElement(location, tag).text = value
+        SubElement(SubElement(root, "scenarioTags"), "urban")
+        ids = _Ids(len(made.roads))
+        out = _arms(made)
+        signs = {name: ids.new() for name in made.junctions if made.junctions[name].all_way_stop}
+        for number, road in enumerate(made.roads):
+            for back in (False, True):
+                _write_lanelet(root, number, road, back, out, signs)
+        for name, sign in signs.items():
+            _sign(root, sign, made, name)
+        for arms in out.values():
+            if len(arms) > 2:
+                _intersection(root, ids, arms)
+        return document(root, hints_text(made, [ids.lanelet(k, False) for k in range(len(made.roads))]))
 
 
 def _lanelet(reader: Reader, element: Element, known: Collection[str], stopping: set[str]) -> Lanelet:
@@ -104,34 +127,6 @@ class _Ids:
     def new(self) -> str:
         self._next += 1
         return str(self._next)
-
-
-def write_commonroad(made: RoadMap) -> str:
-    """Return the text of a scenario without cars; an intersection for each junction of three roads or more."""
-    root = Element("commonRoad", commonRoadVersion="2020a", benchmarkID="USA_DubinsTraffic-1_1_T-1")
-    root.attrib |= {
-        "date": "2016-05-16",
-        "author": "",
-        "affiliation": "",
-        "source": "dubins-traffic",
-        "timeStepSize": "0.1",
-    }
-    location = SubElement(root, "location")
-    for tag, value in (("geoNameId", "-999"), ("gpsLatitude", "999"), ("gpsLongitude", "999")):
-        SubElement(location, tag).text = value
-    SubElement(SubElement(root, "scenarioTags"), "urban")
-    ids = _Ids(len(made.roads))
-    out = _arms(made)
-    signs = {name: ids.new() for name in made.junctions if made.junctions[name].all_way_stop}
-    for number, road in enumerate(made.roads):
-        for back in (False, True):
-            _write_lanelet(root, number, road, back, out, signs)
-    for name, sign in signs.items():
-        _sign(root, sign, made, name)
-    for arms in out.values():
-        if len(arms) > 2:
-            _intersection(root, ids, arms)
-    return document(root, hints_text(made, [ids.lanelet(k, False) for k in range(len(made.roads))]))
 
 
 Arm = tuple[int, bool, float]

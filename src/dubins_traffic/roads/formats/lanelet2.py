@@ -62,8 +62,25 @@ class Lanelet2(WrittenFormat):
         return with_hints(lanelet_map(lanelets), text, file).checked(file)
 
     def write_map(self, made: RoadMap) -> str:
-        """Return the text of a map."""
-        return write_lanelet2(made)
+        """Return the text of a map; every junction where all stop is a regulatory element `all_way_stop`."""
+        text = _Text()
+        centres = {name: text.node(np.array(junction[:2])) for name, junction in made.junctions.items()}
+        lanelets: list[tuple[str, str]] = []
+        stops: dict[str, list[tuple[str, str]]] = {
+            name: [] for name, at in made.junctions.items() if at.all_way_stop
+        }
+        for road in made.roads:
+            forward, backward = _road(text, road, centres)
+            lanelets.append((forward, backward))
+            for lanelet, name, line in (
+                (forward, road.last, road.line[::-1]),
+                (backward, road.first, road.line),
+            ):
+                if name in stops:
+                    stops[name].append((lanelet, _stop_line(text, line, road.lane_width)))
+        for pairs in stops.values():
+            text.all_way_stop(pairs)
+        return document(text.root(), hints_text(made, [forward for forward, _ in lanelets]))
 
 
 class _Bounded(NamedTuple):
@@ -121,25 +138,6 @@ def _stopping(osm: Osm) -> set[str]:
             ]
             found |= {each.get("ref", "") for each in members}
     return found
-
-
-def write_lanelet2(made: RoadMap) -> str:
-    """Return the text of a map; every junction where all stop is a regulatory element `all_way_stop`."""
-    text = _Text()
-    centres = {name: text.node(np.array(junction[:2])) for name, junction in made.junctions.items()}
-    lanelets: list[tuple[str, str]] = []
-    stops: dict[str, list[tuple[str, str]]] = {
-        name: [] for name, at in made.junctions.items() if at.all_way_stop
-    }
-    for road in made.roads:
-        forward, backward = _road(text, road, centres)
-        lanelets.append((forward, backward))
-        for lanelet, name, line in ((forward, road.last, road.line[::-1]), (backward, road.first, road.line)):
-            if name in stops:
-                stops[name].append((lanelet, _stop_line(text, line, road.lane_width)))
-    for pairs in stops.values():
-        text.all_way_stop(pairs)
-    return document(text.root(), hints_text(made, [forward for forward, _ in lanelets]))
 
 
 class _Text:

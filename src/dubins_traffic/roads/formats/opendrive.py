@@ -67,8 +67,20 @@ class OpenDrive(WrittenFormat):
         return with_hints(RoadMap(junctions, (*roads, *paired(single))), text, file).checked(file)
 
     def write_map(self, made: RoadMap) -> str:
-        """Return the text of a map."""
-        return write_opendrive(made)
+        """Return the text of a map: roads ``0``, ``1``, ..., and junctions where more than two of them meet."""
+        root = Element("OpenDRIVE")
+        SubElement(root, "header", revMajor="1", revMinor="6", name="dubins-traffic", version="1")
+        numbers = {name: str(k) for k, name in enumerate(made.junctions)}
+        meet: dict[str, list[tuple[int, str]]] = {name: [] for name in made.junctions}
+        for k, road in enumerate(made.roads):
+            meet[road.first].append((k, "start"))
+            meet[road.last].append((k, "end"))
+        for k, road in enumerate(made.roads):
+            _road(root, k, road, made, numbers, meet)
+        for name, ends in meet.items():
+            if len(ends) > 2:
+                SubElement(root, "junction", id=numbers[name], name=name)
+        return document(root, hints_text(made, [str(k) for k in range(len(made.roads))]))
 
 
 def _joined(
@@ -201,23 +213,6 @@ def _lanes(reader: Reader, road: Element) -> tuple[int, int, float]:
     ]
     usual = max(widths, default=LANE_WIDTH)
     return len(sides[0]), len(sides[1]), usual if usual > 0.0 else LANE_WIDTH
-
-
-def write_opendrive(made: RoadMap) -> str:
-    """Return the text of a map: roads ``0``, ``1``, ..., and junctions where more than two of them meet."""
-    root = Element("OpenDRIVE")
-    SubElement(root, "header", revMajor="1", revMinor="6", name="dubins-traffic", version="1")
-    numbers = {name: str(k) for k, name in enumerate(made.junctions)}
-    meet: dict[str, list[tuple[int, str]]] = {name: [] for name in made.junctions}
-    for k, road in enumerate(made.roads):
-        meet[road.first].append((k, "start"))
-        meet[road.last].append((k, "end"))
-    for k, road in enumerate(made.roads):
-        _road(root, k, road, made, numbers, meet)
-    for name, ends in meet.items():
-        if len(ends) > 2:
-            SubElement(root, "junction", id=numbers[name], name=name)
-    return document(root, hints_text(made, [str(k) for k in range(len(made.roads))]))
 
 
 def _road(

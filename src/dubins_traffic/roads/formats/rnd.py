@@ -341,8 +341,35 @@ class RndText:
         return may_be(text) and _first(text).partition(":")[0].strip() in FIELDS
 
     def read(self, text: str, file: str | None = None) -> Mapping[str, Any]:
-        """Return the document in a text."""
-        return parse_lines(text, file)
+        """Return the fields in plain text.
+
+        Raises
+        ------
+        InputError
+            If a line is none, or a key stands twice. The fields themselves are not looked at.
+        """
+        document: dict[str, Any] = {}
+        segments: list[list[Any]] | None = None
+        for number, full in enumerate(re.split(r"\r\n|\r|\n", text), start=1):
+            line = full.split("#", 1)[0].strip()
+            if not line:
+                continue
+            if segments is not None:
+                segments.append([_number(token) for token in line.split()])
+                continue
+            key, value = _entry(line, number, file)
+            if key in document:
+                raise InputError(f"key given twice (line {number})", file=file, field=key)
+            if key == "segments":
+                if value:
+                    raise InputError(f"not a line break (line {number})", file=file, field=key, value=value)
+                document[key] = segments = []
+            elif key in FIELDS:
+                row = [_number(token) for token in value.split()]
+                document[key] = row[0] if key in {"version", "length"} and len(row) == 1 else row
+            else:
+                document[key] = _value(value)
+        return document
 
     def write(self, document: Mapping[str, Any]) -> str:
         """Return the text of a document."""
@@ -378,38 +405,6 @@ def write_lines(document: Mapping[str, Any]) -> str:
     lines.append("segments:")
     lines += [" ".join(_json(number) for number in segment) for segment in document["segments"]]
     return "\n".join(lines) + "\n"
-
-
-def parse_lines(text: str, file: str | None) -> dict[str, Any]:
-    """Return the fields in plain text.
-
-    Raises
-    ------
-    InputError
-        If a line is none, or a key stands twice. The fields themselves are not looked at.
-    """
-    document: dict[str, Any] = {}
-    segments: list[list[Any]] | None = None
-    for number, full in enumerate(re.split(r"\r\n|\r|\n", text), start=1):
-        line = full.split("#", 1)[0].strip()
-        if not line:
-            continue
-        if segments is not None:
-            segments.append([_number(token) for token in line.split()])
-            continue
-        key, value = _entry(line, number, file)
-        if key in document:
-            raise InputError(f"key given twice (line {number})", file=file, field=key)
-        if key == "segments":
-            if value:
-                raise InputError(f"not a line break (line {number})", file=file, field=key, value=value)
-            document[key] = segments = []
-        elif key in FIELDS:
-            row = [_number(token) for token in value.split()]
-            document[key] = row[0] if key in {"version", "length"} and len(row) == 1 else row
-        else:
-            document[key] = _value(value)
-    return document
 
 
 def _entry(line: str, number: int, file: str | None) -> tuple[str, str]:

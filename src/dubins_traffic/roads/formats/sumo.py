@@ -37,27 +37,45 @@ class SumoNet(WrittenFormat):
         return root_name(text) == "net"
 
     def read_map(self, text: str, file: str | None = None) -> RoadMap:
-        """Return the map in a text."""
-        return read_net(text, file)
+        """Return the map in a SUMO network; InputError if the text is broken."""
+        root = parse(text, "net", file)
+        reader = Reader(file)
+        found = reader.unique(each for each in root.iter("junction") if each.get("type") != "internal")
+        junctions = {
+            name: Junction(reader.number(each, "x"), reader.number(each, "y"), each.get("type") == STOP)
+            for name, each in found.items()
+        }
+        edges = reader.unique(
+            each for each in root.iter("edge") if each.get("function", "normal") == "normal"
+        )
+        directions = [_direction(reader, each, junctions) for each in edges.values()]
+        made = RoadMap(junctions, paired([one for one in directions if one.lanes]))
+        return with_hints(made, text, file).checked(file)
 
     def write_map(self, made: RoadMap) -> str:
-        """Return the text of a map."""
-        return write_net(made)
-
-
-def read_net(text: str, file: str | None = None) -> RoadMap:
-    """Return the map in a SUMO network; InputError if the text is broken."""
-    root = parse(text, "net", file)
-    reader = Reader(file)
-    found = reader.unique(each for each in root.iter("junction") if each.get("type") != "internal")
-    junctions = {
-        name: Junction(reader.number(each, "x"), reader.number(each, "y"), each.get("type") == STOP)
-        for name, each in found.items()
-    }
-    edges = reader.unique(each for each in root.iter("edge") if each.get("function", "normal") == "normal")
-    directions = [_direction(reader, each, junctions) for each in edges.values()]
-    made = RoadMap(junctions, paired([one for one in directions if one.lanes]))
-    return with_hints(made, text, file).checked(file)
+        """Return the text of a SUMO network; each road becomes two edges, ``name`` and ``-name``."""
+        places = np.concatenate([road.line for road in made.roads])
+        box = ",".join(number_text(float(each)) for each in (*places.min(axis=0), *places.max(axis=0)))
+        root = Element("net", version="1.20", junctionCornerDetail="5", limitTurnSpeed="5.50")
+        SubElement(
+            root, "location", netOffset="0.00,0.00", convBoundary=box, origBoundary=box, projParameter="!"
+        )
+        lanes: list[Lane] = []
+        for number, road in enumerate(made.roads):
+            lanes += _lanes(number, road)
+            _edge(root, lanes[-2], road, road.line)
+            _edge(root, lanes[-1], road, road.line[::-1])
+        out: dict[str, list[Lane]] = {name: [] for name in made.junctions}
+        into: dict[str, list[Lane]] = {name: [] for name in made.junctions}
+        for lane in lanes:
+            out[lane.first].append(lane)
+            into[lane.last].append(lane)
+        links = {name: _links(into[name], out[name]) for name in made.junctions}
+        for name in made.junctions:
+            _junction(root, name, made, into[name], links[name])
+        for name, own in links.items():
+            _connections(root, own, made.junctions[name].all_way_stop)
+        return document(root, hints_text(made, [road.name for road in made.roads]))
 
 
 def _direction(reader: Reader, edge: Element, junctions: dict[str, Junction]) -> OneWay:
@@ -119,30 +137,6 @@ class Lane(NamedTuple):
     last: str
     out: float
     into: float
-
-
-def write_net(made: RoadMap) -> str:
-    """Return the text of a SUMO network; each road becomes two edges, ``name`` and ``-name``."""
-    places = np.concatenate([road.line for road in made.roads])
-    box = ",".join(number_text(float(each)) for each in (*places.min(axis=0), *places.max(axis=0)))
-    root = Element("net", version="1.20", junctionCornerDetail="5", limitTurnSpeed="5.50")
-    SubElement(root, "location", netOffset="0.00,0.00", convBoundary=box, origBoundary=box, projParameter="!")
-    lanes: list[Lane] = []
-    for number, road in enumerate(made.roads):
-        lanes += _lanes(number, road)
-        _edge(root, lanes[-2], road, road.line)
-        _edge(root, lanes[-1], road, road.line[::-1])
-    out: dict[str, list[Lane]] = {name: [] for name in made.junctions}
-    into: dict[str, list[Lane]] = {name: [] for name in made.junctions}
-    for lane in lanes:
-        out[lane.first].append(lane)
-        into[lane.last].append(lane)
-    links = {name: _links(into[name], out[name]) for name in made.junctions}
-    for name in made.junctions:
-        _junction(root, name, made, into[name], links[name])
-    for name, own in links.items():
-        _connections(root, own, made.junctions[name].all_way_stop)
-    return document(root, hints_text(made, [road.name for road in made.roads]))
 
 
 def _lanes(number: int, road: Road) -> tuple[Lane, Lane]:
