@@ -345,13 +345,13 @@ class Lots(NamedTuple):
 class Room(NamedTuple):
     """Scratch for one trial: for each area two lists of intervals that take turns.
 
-    `lane` (A, 2, K) and `span` (A, 2, K, 2): lane and ends (m) of each interval; `count` (A,): how many there are;
+    `lane` (A, 2, K) and `span` (A, 2, K, 2): lane and ends (m) of each interval; `counts` (A,): how many there are;
     `ends` (K,): what is free up to the end of each, m.
     """
 
     lane: Ints
     span: Floats
-    count: Ints
+    counts: Ints
     ends: Floats
 
 
@@ -369,15 +369,11 @@ def lots(car: Car, areas: Sequence[Places], wishes: Sequence[Wish], gap: float =
         if own is not None:
             allowed[k] = False
             allowed[k, list(own)] = True
-    return Lots(
-        line,
-        *(np.concatenate(columns) for columns in zip(*(own for _, own in free), strict=True)),
-        np.concatenate([[0], np.cumsum([len(own.lane) for _, own in free])]).astype(np.int64),
-        np.array(given, dtype=np.float64).reshape(len(given), 2),
-        np.array(order, dtype=np.int64),
-        allowed,
-        gap_radius(car, gap) + SLACK,
-    )
+    lane, low, high = (np.concatenate(columns) for columns in zip(*(own for _, own in free), strict=True))
+    first = np.cumsum([0, *(len(own.lane) for _, own in free)]).astype(np.int64)
+    positions = np.array(given, dtype=np.float64).reshape(len(given), 2)
+    radius = gap_radius(car, gap) + SLACK
+    return Lots(line, lane, low, high, first, positions, np.array(order, dtype=np.int64), allowed, radius)
 
 
 def draw_starts(areas: Areas, car: Car, wishes: Sequence[Wish], draws: Draws) -> list[Pose]:
@@ -498,10 +494,10 @@ def place_trials(own: Lots, shares: Floats, ranks: Ints, room: Room, poses: Floa
     """
     cars = own.order.shape[0]
     for b in range(shares.shape[0]):
-        for a in range(room.count.shape[0]):
+        for a in range(room.counts.shape[0]):
             start = own.first[a]
-            room.count[a] = own.first[a + 1] - start
-            for k in range(room.count[a]):
+            room.counts[a] = own.first[a + 1] - start
+            for k in range(room.counts[a]):
                 room.lane[a, 0, k] = own.lane[start + k]
                 room.span[a, 0, k, 0] = own.low[start + k]
                 room.span[a, 0, k, 1] = own.high[start + k]
@@ -515,7 +511,7 @@ def place_trials(own: Lots, shares: Floats, ranks: Ints, room: Room, poses: Floa
         while 0 <= placed[b] < cars:
             car = placed[b]
             area, spot, along = -1, -1, 0.0
-            while spot < 0 and area + 1 < room.count.shape[0]:
+            while spot < 0 and area + 1 < room.counts.shape[0]:
                 area += 1
                 if ranks.shape[0] > 0:
                     spot, along = _first(own, car, ranks, area, side, room)
@@ -536,7 +532,7 @@ def place_trials(own: Lots, shares: Floats, ranks: Ints, room: Room, poses: Floa
 def _first(own: Lots, car: int, ranks: Ints, area: int, side: int, room: Room) -> tuple[int, float]:
     """Return the first interval of the lane of lowest rank that a car may take, and its beginning; -1 if none is."""
     best = -1
-    for k in range(room.count[area]):
+    for k in range(room.counts[area]):
         lane = room.lane[area, side, k]
         if own.allowed.shape[0] > 0 and not own.allowed[car, lane]:
             continue
@@ -553,7 +549,7 @@ def _choose(own: Lots, car: int, share: float, area: int, side: int, room: Room)
     lane, span, ends = room.lane[area, side], room.span[area, side], room.ends
     total = 0.0
     last = -1
-    for k in range(room.count[area]):
+    for k in range(room.counts[area]):
         width = span[k, 1] - span[k, 0]
         if own.allowed.shape[0] > 0 and not own.allowed[car, lane[k]]:
             width = 0.0
@@ -580,11 +576,11 @@ def _choose(own: Lots, car: int, share: float, area: int, side: int, room: Room)
 def _cut_out(own: Lots, x: float, y: float, side: int, room: Room) -> bool:
     """Take a disc out of the intervals of all areas; return whether the scratch was large enough."""
     square = own.radius * own.radius
-    for a in range(room.count.shape[0]):
+    for a in range(room.counts.shape[0]):
         lane, span = room.lane[a, side], room.span[a, side]
         new_lane, new_span = room.lane[a, 1 - side], room.span[a, 1 - side]
         total = 0
-        for k in range(room.count[a]):
+        for k in range(room.counts[a]):
             if total + 2 > new_lane.shape[0]:
                 return False
             line = own.line[lane[k]]
@@ -612,7 +608,7 @@ def _cut_out(own: Lots, x: float, y: float, side: int, room: Room) -> bool:
                 new_span[total, 0] = span[k, 0]
                 new_span[total, 1] = span[k, 1]
                 total += 1
-        room.count[a] = total
+        room.counts[a] = total
     return True
 
 
