@@ -19,7 +19,7 @@ from scripts import lcm_messages
 from dubins_traffic.errors import InputError, TransportError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.senses import Laser
+from dubins_traffic.problem.parts import Laser
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.transports.clocks import Lockstep

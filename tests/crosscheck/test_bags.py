@@ -12,8 +12,7 @@ import pytest
 import dubins_traffic as dt
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
-from dubins_traffic.interchange.bag_reader import bag_to_records
-from dubins_traffic.interchange.bags import trial_data_path, typestore, write_bag
+from dubins_traffic.interchange.bags import bag_to_records, trial_data_path, typestore, write_bag
 from dubins_traffic.transports.ros1.messages import MD5
 
 pytestmark = pytest.mark.path

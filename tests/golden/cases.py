@@ -21,7 +21,7 @@ from dubins_traffic.cli.main import main as command_line
 from dubins_traffic.logic.exports import FORMATS
 from dubins_traffic.logic.formula import FormulaError
 from dubins_traffic.problem import document as documents
-from dubins_traffic.problem import recipe
+from dubins_traffic.problem import draw as drawing
 from dubins_traffic.record.export import export
 from dubins_traffic.rules.task import task
 from dubins_traffic.synthesis.answer import answer
@@ -306,7 +306,7 @@ def _variants() -> dict[str, Case]:
 
 def _not_refused(case: Case, folder: Path) -> Parts:
     """Give a case whose first obstacle leaves a goal no free exit, which is refused by now; cars drive as they did."""
-    with patch.object(recipe, "check_obstructions"), patch.object(documents, "check_obstructions"):
+    with patch.object(drawing, "check_obstructions"), patch.object(documents, "check_obstructions"):
         yield from case(folder)
 
 

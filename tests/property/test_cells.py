@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dubins_traffic.roads.cells import covered
+from dubins_traffic.roads.surface import covered
 
 coordinates = st.floats(-30, 30) | st.integers(-30, 30).map(float)
 SUBNORMAL = 6.67522158e-313

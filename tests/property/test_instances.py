@@ -21,7 +21,7 @@ from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.overlap import body_shape, overlap
 from dubins_traffic.problem.starts import TIGHT, Ground, Wish, check_given
-from dubins_traffic.roads.from_grid import most_segments
+from dubins_traffic.roads.generate import most_segments
 from dubins_traffic.roads.network import RoadNetwork
 from tests.roadnets import networks
 

@@ -21,7 +21,7 @@ from dubins_traffic.problem.document import instance_from_document, instance_to_
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.files import parse_json
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.problem.senses import Laser
+from dubins_traffic.problem.parts import Laser
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial

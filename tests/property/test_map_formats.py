@@ -16,8 +16,7 @@ from hypothesis import strategies as st
 
 from dubins_traffic.roads.formats import registry
 from dubins_traffic.roads.formats.registry import WritesMaps
-from dubins_traffic.roads.from_grid import most_segments
-from dubins_traffic.roads.generate import generate
+from dubins_traffic.roads.generate import generate, most_segments
 from dubins_traffic.roads.maps.losses import Losses
 from dubins_traffic.roads.maps.polylines import to_segments
 from dubins_traffic.roads.maps.settings import ImportSettings

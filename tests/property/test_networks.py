@@ -12,8 +12,7 @@ from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.roads.checks import meetings
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.formats.rnd import FIELDS
-from dubins_traffic.roads.from_grid import most_segments
-from dubins_traffic.roads.generate import generate, random_network, thinned_grid
+from dubins_traffic.roads.generate import generate, most_segments, random_network, thinned_grid
 from dubins_traffic.roads.network import RoadNetwork
 
 json_values = st.recursive(

@@ -8,8 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dubins_traffic.kernels.ahead import fetch
-from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.arrays import Floats, Ints, fetch
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Rows, record, table
 

@@ -24,7 +24,7 @@ from dubins_traffic.problem.document import instance_from_document, instance_to_
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.files import dumps, write_document
 from dubins_traffic.problem.kinds import KINDS, kind_of, parameters_of
-from dubins_traffic.problem.senses import Laser
+from dubins_traffic.problem.parts import Laser
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.roads.network import RoadNetwork
 from tests.unit import test_bad_documents as bad

@@ -9,11 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_traffic.roads.chain import chain
-from dubins_traffic.roads.maps.arms import spread
-from dubins_traffic.roads.maps.conflicts import on_itself
+from dubins_traffic.roads.chains import chain
+from dubins_traffic.roads.formats.opendrive import Placed, clothoid, cubic, cubic_over
+from dubins_traffic.roads.maps.drafting import on_itself, spread
 from dubins_traffic.roads.maps.fitting import Fit, Limits, fit
-from dubins_traffic.roads.maps.geometry import Placed, clothoid, cubic, cubic_over
 from dubins_traffic.roads.maps.polylines import rounded, to_segments, true_length
 from dubins_traffic.roads.maps.settings import ImportSettings
 

@@ -10,8 +10,7 @@ import dubins_traffic as dt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.configuration import load_config
-from dubins_traffic.problem.draw import draw, draw_many
-from dubins_traffic.problem.drawing import Stream, draw_goals
+from dubins_traffic.problem.draw import Stream, draw, draw_goals, draw_many
 from dubins_traffic.roads.network import RoadNetwork
 from tests.shuttle import NAME, counted, document
 

@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.kernels.columns import columns
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.kernels.records import Rows, layout, record, stack, table
+from dubins_traffic.kernels.records import Rows, columns, layout, record, stack, table
 
 
 @record

@@ -10,7 +10,7 @@ from dubins_traffic.errors import ControllerError, DubinsTrafficError
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.senses import Disturbances, Laser
+from dubins_traffic.problem.parts import Disturbances, Laser
 from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.scoring.score import Scorer

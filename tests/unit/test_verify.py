@@ -15,7 +15,7 @@ import dubins_traffic as dt
 from dubins_traffic.errors import RecordError
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.problem.senses import Disturbances
+from dubins_traffic.problem.parts import Disturbances
 from dubins_traffic.protocols import End
 from dubins_traffic.record import schema, wall
 from dubins_traffic.record.reader import from_bytes

@@ -20,7 +20,7 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.trig import sincos
-from dubins_traffic.problem.cycles import cycle_lanes
+from dubins_traffic.problem.draw import cycle_lanes
 from dubins_traffic.problem.kinds import parameters_of
 
 if TYPE_CHECKING:

@@ -27,7 +27,7 @@ from dubins_traffic.policies.rules.tables import (
     scratch,
     vehicles_of,
 )
-from dubins_traffic.problem.cycles import cycle_lanes
+from dubins_traffic.problem.draw import cycle_lanes
 from dubins_traffic.problem.kinds import FREE, KEEP_RULES, parameters_of
 from dubins_traffic.roads.table import pack_distinct
 

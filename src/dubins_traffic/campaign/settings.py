@@ -16,8 +16,7 @@ from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Open, Strict, fault
 from dubins_traffic.problem.parts import Length
 from dubins_traffic.problem.settings import VERSION_0_KEYS, AgentEntry, Settings
-from dubins_traffic.roads.from_grid import most_segments
-from dubins_traffic.roads.generate import MOST_INTERSECTIONS
+from dubins_traffic.roads.generate import MOST_INTERSECTIONS, most_segments
 
 NAME = r"^[^\s/\\][^/\\]*$"
 MOST_CELLS = 100_000

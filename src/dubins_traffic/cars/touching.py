@@ -7,7 +7,7 @@ import math
 from collections.abc import Sequence
 
 from dubins_traffic.cars.body import Car, Obstacle
-from dubins_traffic.cars.partners import PARTED
+from dubins_traffic.cars.motion import PARTED
 from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.tables import box_of, pack_cars, pack_obstacles
 from dubins_traffic.kernels.boxes import Box, separation

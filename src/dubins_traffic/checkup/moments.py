@@ -28,7 +28,7 @@ from dubins_traffic.observations.flat import FlatObserver
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.instance import Instance, Problem
-from dubins_traffic.problem.senses import Disturbances, Laser
+from dubins_traffic.problem.parts import Disturbances, Laser
 from dubins_traffic.record import reader
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import pack

@@ -69,8 +69,7 @@ def convert(
     ...); beside a bag stands the trial data of 2016, `.trial.json`.
     """
     from dubins_traffic.files import is_stream
-    from dubins_traffic.interchange.bag_reader import is_bag
-    from dubins_traffic.interchange.bags import write_bag
+    from dubins_traffic.interchange.bags import is_bag, write_bag
     from dubins_traffic.interchange.lcm_log import is_log
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.export import export
@@ -113,7 +112,7 @@ def convert(
 
 def _to_records(file: str, output: str, *, overwrite: bool) -> None:
     """Write the trials of a bag or log as records."""
-    from dubins_traffic.interchange.bag_reader import bag_to_records, is_bag
+    from dubins_traffic.interchange.bags import bag_to_records, is_bag
     from dubins_traffic.interchange.lcm_log import log_to_records
     from dubins_traffic.record.writer import SUFFIX
 

@@ -85,7 +85,7 @@ class TrialProgress:
 
 @record
 class ContactNote:
-    """Tick and flags of a contact, beside the `cars.partners.Meeting`."""
+    """Tick and flags of a contact, beside the `cars.motion.Meeting`."""
 
     tick: int
     """The frame in which its tick ends."""

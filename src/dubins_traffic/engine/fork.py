@@ -14,7 +14,7 @@ import numpy.typing as npt
 
 from dubins_traffic.agents.free import Free
 from dubins_traffic.agents.tables import Agents
-from dubins_traffic.cars.rows import rows
+from dubins_traffic.cars.clip_and_move import rows
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.engine.batch_kernel import BreachPlace, ContactNote, World
 from dubins_traffic.kernels.arrays import Ints

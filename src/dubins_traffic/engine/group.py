@@ -13,9 +13,9 @@ from dubins_traffic.agents.fleet import PAIRS, pack_agents
 from dubins_traffic.agents.free import free_tables
 from dubins_traffic.agents.lawful import pack_drivers
 from dubins_traffic.agents.tables import wider, workspace
+from dubins_traffic.cars.clip_and_move import TOGETHER
+from dubins_traffic.cars.motion import enlarged
 from dubins_traffic.cars.near import spacing
-from dubins_traffic.cars.partners import enlarged
-from dubins_traffic.cars.rows import TOGETHER
 from dubins_traffic.cars.state import EGO, Contact, Event, Labels, State
 from dubins_traffic.engine.batch_kernel import (
     STATUS,

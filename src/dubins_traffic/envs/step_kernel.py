@@ -10,8 +10,7 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.engine.batch_kernel import STATUS, World, run_trials
 from dubins_traffic.envs.tables import StepTables
 from dubins_traffic.envs.terms import AT_FAULT, TERM
-from dubins_traffic.kernels.ahead import fetch
-from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints
+from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints, fetch
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.observations.flat_kernel import sweep, within, write_flat
 from dubins_traffic.observations.outlook import OutlookTables

@@ -13,7 +13,7 @@ from dubins_traffic.falsification.sampling import CHOSEN
 from dubins_traffic.logic.temporal import ticks
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import FREE, KINDS, parameters_of
-from dubins_traffic.problem.senses import Disturbances
+from dubins_traffic.problem.parts import Disturbances
 from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.network import RoadNetwork
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,6 @@ import numpy.typing as npt
 Floats: TypeAlias = npt.NDArray[np.float64]
 Ints: TypeAlias = npt.NDArray[np.int64]
 Bits: TypeAlias = npt.NDArray[np.uint32]
-
 INFINITE = float("inf")
 """So far, so long: where there is none."""
 BLOCK = 8
@@ -29,3 +28,7 @@ def distinct(keys: Sequence[Hashable]) -> tuple[list[int], Ints]:
     index = [numbers.setdefault(key, len(numbers)) for key in keys]
     first = [index.index(number) for number in range(len(numbers))] if len(numbers) < len(index) else index
     return first, np.array(index, dtype=np.int64)
+
+
+def fetch(array: Any, place: Any) -> None:
+    """Bring all of the row of `array` (array or table) at `place` (a number for each of its first axes), or nothing."""

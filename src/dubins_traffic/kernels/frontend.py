@@ -2,24 +2,37 @@
 
 Each function here changes one inner part of Numba, in the builder's process alone. What they leave out is looking up
 what has been found before, and telling of events to which nobody listens.
+
+`Pipeline` has the steps by which a kernel is compiled: those of Numba's usual ones that can find anything to do in a
+kernel. Numba's own way has 27 steps, after many of which it works out anew which variable is alive where, in order to
+say where each ends: there it counts references and clears memory, of which kernels need neither. Nor have kernels
+closures, comprehensions, `with`, `raise`, literal arguments or expressions on whole arrays, for which most other steps
+are; a function with code inside goes Numba's own way.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from types import CodeType
 from typing import Any, cast
 
 import llvmlite.binding.ffi  # pyright: ignore[reportMissingTypeStubs]
 from numba.core import (
     base,  # pyright: ignore[reportMissingTypeStubs]
+    compiler,  # pyright: ignore[reportMissingTypeStubs]
     event,  # pyright: ignore[reportMissingTypeStubs]
     interpreter,  # pyright: ignore[reportMissingTypeStubs]
     ir,  # pyright: ignore[reportMissingTypeStubs]
+    ir_utils,  # pyright: ignore[reportMissingTypeStubs]
     lowering,  # pyright: ignore[reportMissingTypeStubs]
+    rewrites,  # pyright: ignore[reportMissingTypeStubs]
     ssa,  # pyright: ignore[reportMissingTypeStubs]
     targetconfig,  # pyright: ignore[reportMissingTypeStubs]
+    transforms,  # pyright: ignore[reportMissingTypeStubs]
+    typed_passes,  # pyright: ignore[reportMissingTypeStubs]
     typeinfer,  # pyright: ignore[reportMissingTypeStubs]
+    untyped_passes,  # pyright: ignore[reportMissingTypeStubs]
 )
 from numba.core.types import functions  # pyright: ignore[reportMissingTypeStubs]
 from numba.core.typing import context  # pyright: ignore[reportMissingTypeStubs]
@@ -28,6 +41,9 @@ _ffi, _base, _event, _ir = cast(Any, llvmlite.binding.ffi), cast(Any, base), cas
 _lowering, _infer, _ssa = cast(Any, lowering), cast(Any, typeinfer), cast(Any, ssa)
 _interpreter = cast(Any, interpreter)
 _settings, _functions, _typing = cast(Any, targetconfig), cast(Any, functions), cast(Any, context)
+_untyped, _typed, _utils = cast(Any, untyped_passes), cast(Any, typed_passes), cast(Any, ir_utils)
+_transforms, _rewrites = cast(Any, transforms), cast(Any, rewrites)
+_usual = cast(Any, compiler).Compiler
 
 IMPLEMENTED = "functions", "getattrs", "setattrs", "casts", "constants"
 TYPED = "functions", "attributes", "globals"
@@ -206,3 +222,68 @@ def _leave_whole() -> None:
 
 def _same_function(function: Any) -> Any:
     return function
+
+
+class Pipeline(_usual):
+    """Compiles one function for arguments of some types."""
+
+    def _compile_core(self) -> Any:
+        state = self.state
+        if any(isinstance(constant, CodeType) for constant in state.func_id.code.co_consts):
+            return _usual._compile_core(self)
+        state.type_annotation = None
+        with _settings.ConfigStack().enter(state.flags.copy()):
+            for step in STEPS:
+                step(state)
+        state.pipeline = None
+        return state.cr
+
+
+def _order(state: Any) -> None:
+    """Join blocks of which one follows another, and leave out those that are never reached."""
+    state.func_ir.blocks = _transforms.canonicalize_cfg(state.func_ir.blocks)
+
+
+def _prune(state: Any) -> None:
+    """Leave out branches that arguments which are None decide."""
+    _untyped.dead_branch_prune(state.func_ir, state.args)
+
+
+def _rewrite(state: Any) -> None:
+    """Put in what is known before types are: codes (`kernels.lowering`), constant indices."""
+    blocks = state.func_ir.blocks
+    for kind in _rewrites.rewrite_registry.rewrites["before-inference"]:
+        rewrite = kind(state)
+        waiting = list(blocks.items())
+        while waiting:
+            label, block = waiting.pop()
+            if rewrite.match(state.func_ir, block, state.typemap, state.calltypes):
+                blocks[label] = rewrite.apply()
+                waiting.append((label, blocks[label]))
+
+
+def _assign_once(state: Any) -> None:
+    """Give each variable one assignment."""
+    state.func_ir = _ssa.reconstruct_ssa(state.func_ir)
+    state.func_ir._definitions = _utils.build_definitions(state.func_ir.blocks)
+
+
+def _join(state: Any) -> None:
+    """Put assignments in place of what joins variables of several blocks."""
+    state.func_ir = _typed.PreLowerStripPhis()._strip_phi_nodes(state.func_ir)
+    state.func_ir._definitions = _utils.build_definitions(state.func_ir.blocks)
+
+
+STEPS = (
+    _untyped.TranslateByteCode().run_pass,
+    _untyped.FixupArgs().run_pass,
+    _order,
+    _untyped.RewriteSemanticConstants().run_pass,
+    _prune,
+    _rewrite,
+    _assign_once,
+    _typed.NopythonTypeInference().run_pass,
+    _join,
+    _typed.NativeLowering().run_pass,
+    _typed.NoPythonBackend().run_pass,
+)

@@ -17,6 +17,18 @@ takes a row takes one argument, however many fields it has.
 
 In plain Python a row is a structure of `ctypes` on the table's memory, kept by the table: where kernels run interpreted
 they read a field of it in less time than an element of an array, and of a row of NumPy's in a tenth of the time.
+
+For loops that take several cars at once (`kernels.arrays.BLOCK`) there are blocks of columns with names:
+
+    @columns(BLOCK)
+    class Places:
+        x: Floats
+
+    block = places[b, n // BLOCK]
+    block.x[n % BLOCK] += 1.0
+
+Compiled, a block is a pointer and a column an array at a fixed distance from it, so that the compiler knows how far
+columns are apart and puts loops over them into vectors.
 """
 
 from __future__ import annotations
@@ -32,11 +44,8 @@ from dubins_traffic.kernels.arrays import Ints
 
 R = TypeVar("R")
 R_co = TypeVar("R_co", covariant=True)
-
 KINDS: dict[Any, Any] = {int: ctypes.c_int64, float: ctypes.c_double, np.uint64: ctypes.c_uint64}
 """What a field may be, and how it is kept: eight bytes each."""
-
-
 MOST_KNOWN = 1 << 12
 """Rows of a table that are kept once they have been made; of longer tables others are made anew each time."""
 
@@ -263,3 +272,38 @@ def join(tables: Sequence[Rows[R]]) -> Rows[R]:
 def numbers(rows: Rows[Any], kind: type[np.generic]) -> npt.NDArray[Any]:
     """Return a table whose fields are all of one kind as an array of numbers, with a column for each field: a view."""
     return np.asarray(rows).view(kind).reshape(*rows.shape, -1)
+
+
+def columns(size: int) -> Callable[[type[R]], type[R]]:
+    """Make a class the type of the rows of structured arrays: each annotated field is `size` float64 numbers.
+
+    Its tables are made by `kernels.records.table`; new ones are 0.
+    """
+
+    def make(kind: type[R]) -> type[R]:
+        names = list(get_type_hints(kind))
+        layout = np.dtype([(name, "f8", (size,)) for name in names])
+
+        def at(rows: Any, far: int) -> Any:
+            block = np.ndarray((), layout, rows, far)
+            own = row()
+            for name in names:
+                setattr(own, name, block[name])
+            return own
+
+        row: Any = type(
+            kind.__name__,
+            (),
+            {
+                "__doc__": kind.__doc__,
+                "__module__": kind.__module__,
+                "__qualname__": kind.__qualname__,
+                "__slots__": tuple(names),
+                "FIRST_VALUES": {},
+                "LAYOUT": layout,
+            },
+        )
+        row.TABLE = type(f"{kind.__name__}Table", (Table,), {"KIND": staticmethod(at), "RECORD": row})
+        return cast(type[R], row)
+
+    return make

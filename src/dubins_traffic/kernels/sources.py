@@ -16,8 +16,7 @@ LIBRARIES = ("numba", "llvmlite", "numpy")
 """What compiles kernels."""
 
 MAKERS = frozenset(
-    PACKAGE / "kernels" / f"{name}.py"
-    for name in ("codes", "compiler", "elements", "fetching", "frontend", "kinds", "pipeline", "pointers")
+    PACKAGE / "kernels" / f"{name}.py" for name in ("compiler", "frontend", "kinds", "lowering")
 )
 """The sources that say how kernels are compiled and called: they count for all kernels."""
 

@@ -25,7 +25,7 @@ from dubins_traffic.kernels.records import numbers
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
-    from dubins_traffic.problem.senses import Laser
+    from dubins_traffic.problem.parts import Laser
     from dubins_traffic.protocols import Scans
 
 

@@ -16,12 +16,11 @@ from dubins_traffic.display import count
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import exists, is_file
 from dubins_traffic.kernels.angles import sincos
-from dubins_traffic.problem.faults import parse
+from dubins_traffic.problem.faults import parse, version_of
 from dubins_traffic.problem.files import Kind, Source, detect, parse_json, plain, read_source
 from dubins_traffic.problem.instance import EAgent
 from dubins_traffic.problem.kinds import kind_of, parameters_of
 from dubins_traffic.problem.settings import VERSION_0_KEYS, AgentEntry, Settings, Settings0
-from dubins_traffic.problem.versions import version_of
 from dubins_traffic.roads.network import RoadNetwork
 
 

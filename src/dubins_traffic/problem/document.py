@@ -10,15 +10,15 @@ from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.configuration import PlannedAgent, check_goal, plan_agents, pose_of
-from dubins_traffic.problem.draw import check_numbers
-from dubins_traffic.problem.drawing import (
+from dubins_traffic.problem.draw import (
     Stream,
     agent_wishes,
+    check_numbers,
     complete_agents,
     draw_duration,
     origin_start,
 )
-from dubins_traffic.problem.faults import parse
+from dubins_traffic.problem.faults import parse, version_of
 from dubins_traffic.problem.files import Kind, detect, parse_json, plain, read_source
 from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance, Problem
@@ -27,7 +27,6 @@ from dubins_traffic.problem.parts import CarModel, ObstacleModel
 from dubins_traffic.problem.preconditions import check_demands
 from dubins_traffic.problem.settings import INSTANCE_0_KEYS, InstanceModel, InstanceModel0
 from dubins_traffic.problem.starts import Ground, Wish, areas_of, check_given, draw_starts
-from dubins_traffic.problem.versions import version_of
 from dubins_traffic.roads.network import RoadNetwork
 
 DURATION_BOUNDS = (30, 90)
@@ -167,7 +166,7 @@ def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: 
         duration = draw_duration(DURATION_BOUNDS, Draws(seed, trial, Stream.DURATION))
     return Instance(
         problem=problem,
-        starts=tuple(draw_starts(areas_of(ground), ground, wishes, Draws(seed, trial, Stream.STARTS))),
+        starts=tuple(draw_starts(areas_of(ground), car, wishes, Draws(seed, trial, Stream.STARTS))),
         duration=duration,
         e_agents=agents,
         seed=seed,

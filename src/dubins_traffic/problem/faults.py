@@ -13,7 +13,6 @@ from pydantic_core import ErrorDetails, PydanticCustomError
 from dubins_traffic.errors import InputError
 
 M = TypeVar("M", bound=BaseModel)
-
 _EXPECTED = {
     "missing": "this key",
     "int_type": "an integer",
@@ -35,8 +34,6 @@ _EXPECTED = {
     "string_pattern_mismatch": "a text matching {pattern}",
     "literal_error": "{expected}",
 }
-
-
 ALIKE = 0.8
 """Similarity of two keys (2 matches / characters) from which one counts as the other misspelt."""
 
@@ -179,3 +176,20 @@ def _description(model: type[BaseModel], location: Sequence[int | str]) -> str:
             if (info.alias or name) == location[-1] and info.description:
                 return info.description
     return _EXPECTED["missing"]
+
+
+def version_of(document: Mapping[str, Any], file: str | None = None, known: Sequence[int] = (0, 1)) -> int:
+    """Return the version of `document`.
+
+    Raises
+    ------
+    InputError
+        If there is none or it is not one of `known`.
+    """
+    expected = " or ".join(str(version) for version in known)
+    if "version" not in document:
+        raise InputError("missing", file=file, field="version", expected=expected)
+    version: object = document["version"]
+    if isinstance(version, bool) or not isinstance(version, int) or version not in known:
+        raise InputError("unknown version", file=file, field="version", value=version, expected=expected)
+    return version

@@ -14,7 +14,7 @@ from dubins_traffic.display import Pictured, count
 from dubins_traffic.problem.preconditions import check_curves
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.senses import Disturbances, Laser
+    from dubins_traffic.problem.parts import Disturbances, Laser
     from dubins_traffic.roads.network import RoadNetwork
 
 FREE = "free"
@@ -23,7 +23,7 @@ NUDGED = "nudged"
 
 
 def _undisturbed() -> Disturbances:
-    from dubins_traffic.problem.senses import Disturbances  # Pydantic, which no box is to load
+    from dubins_traffic.problem.parts import Disturbances  # Pydantic, which no box is to load
 
     return Disturbances()
 

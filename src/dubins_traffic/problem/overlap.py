@@ -42,14 +42,9 @@ def obstacle_shape(obstacle: Obstacle) -> Shape:
 def overlap(a: Shape, b: Shape) -> bool:
     """Tell whether two shapes have a point in common."""
     reach = a.rounding + b.rounding
-    if _contains(a, b.corners[0]) or _contains(b, a.corners[0]):
+    if contains(a, b.corners[0]) or contains(b, a.corners[0]):
         return True
     return any(_near(p, q, r, s, reach) for p, q in edges(a) for r, s in edges(b))
-
-
-def contains(shape: Shape, point: Point) -> bool:
-    """Tell whether `point` lies inside the polygon of a shape, by the number of edges to its right."""
-    return _contains(shape, point)
 
 
 def edges(shape: Shape) -> Iterator[tuple[Point, Point]]:
@@ -59,7 +54,8 @@ def edges(shape: Shape) -> Iterator[tuple[Point, Point]]:
         yield corners[k], corners[(k + 1) % len(corners)]
 
 
-def _contains(shape: Shape, point: Point) -> bool:
+def contains(shape: Shape, point: Point) -> bool:
+    """Tell whether `point` lies inside the polygon of a shape, by the number of edges to its right."""
     x, y = point
     inside = False
     for (x0, y0), (x1, y1) in edges(shape):

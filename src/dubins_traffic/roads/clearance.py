@@ -9,15 +9,20 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.cells import covered, pairs
 from dubins_traffic.roads.chains import Bars
-from dubins_traffic.roads.curve_clearance import curve_faults
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.room import LEAST_RADIUS, SEGMENT_SLACK, Clearances, clearances
+from dubins_traffic.roads.surface import covered, pairs
 
 ROUNDING = 1e-9
 STRAIGHTENED = 1e-3
 """How far a curve may be from the bars that stand for it where its clearance is measured, metres."""
+TIGHTEST = 3.0
+"""Arcs have a radius of at least this many w."""
+SAMPLED = 0.1
+"""Roads are measured about this many metres apart, for w = 0.3 m."""
+FAR_ALONG = 9.0
+"""Points of one road that are farther apart along it than this many w must be apart like those of two roads."""
 
 
 class Tight(NamedTuple):
@@ -144,15 +149,16 @@ def clearance_faults(
         )
     found = cast(Tight, network.known[least])
     for s in found.short.tolist():
-        faults.append(_fault("too short", s, float(network.lengths[s]), least.length))
+        faults.append(_fault("too short", s, float(network.lengths[s]), f"at least {least.length:.6g} m"))
     for v, other in _couples(found.close):
         s = int(np.flatnonzero((ends == v).any(axis=1))[0])
         gap = float(_norm(points[v] - points[other]))
         problem = f"intersections {list(names[v])} and {list(names[other])} are too close"
-        faults.append(_fault(problem, s, gap, least.apart))
+        faults.append(_fault(problem, s, gap, f"at least {least.apart:.6g} m"))
     for v, s in _couples(found.beside):
         gap = float(np.sqrt(network.surface.distance2(points[v, 0], points[v, 1], np.array(s))))
-        faults.append(_fault(f"intersection {list(names[v])} is too close to the road", s, gap, least.aside))
+        problem = f"intersection {list(names[v])} is too close to the road"
+        faults.append(_fault(problem, s, gap, f"at least {least.aside:.6g} m"))
     for v, first, second in found.sharp.tolist():
         faults.append(_sharp_fault(network, v, first, second, least.cosine))
     return faults
@@ -177,10 +183,6 @@ def _couples(rows: Ints) -> list[tuple[int, int]]:
     return [(int(row[0]), int(row[1])) for row in rows]
 
 
-def _fault(problem: str, s: int, value: float, least: float) -> InputError:
-    return InputError(problem, field=f"segments[{s}]", value=value, expected=f"at least {least:.6g} m")
-
-
 def _sharp_fault(network: RoadNetwork, v: int, first: int, second: int, cosine: float) -> InputError:
     low, high = sorted((first, second))
     step = [network.tangents[s] if network.ends[s, 0] == v else -network.end_tangents[s] for s in (low, high)]
@@ -191,3 +193,81 @@ def _sharp_fault(network: RoadNetwork, v: int, first: int, second: int, cosine: 
         value=round(180.0 * acos(min(max(between, -1.0), 1.0)) / pi, 2),
         expected=f"more than {180.0 * acos(max(cosine, -1.0)) / pi:.4g} degrees",
     )
+
+
+def curve_faults(
+    network: RoadNetwork, radius: float, reach: float, w: float, slack: float
+) -> list[InputError]:
+    """Return where segments that bend are not straight near their ends, too sharp, or too close to others.
+
+    Parameters are those of `roads.clearance.clearance_faults`.
+
+    Norm: docs/rules.md#curves.
+    """
+    chains = network.chains
+    faults: list[InputError] = []
+    straight = radius + reach + slack
+    for s in np.flatnonzero(network.bent).tolist():
+        own = slice(int(chains.first[s]), int(chains.first[s + 1]))
+        for which, k in (("first", own.start), ("second", own.stop - 1)):
+            if chains.length[k] < straight - ROUNDING:
+                corner = 0 if which == "first" else len(network.corners[s]) - 1
+                problem = f"corner {corner}: too near to the {which} end"
+                expected = f"a straight road for at least {straight:.6g} m from there"
+                faults.append(_fault(problem, s, float(chains.length[k]), expected))
+        for corner, (_, _, given) in enumerate(network.corners[s]):
+            own_radius = given * network.length
+            if own_radius < TIGHTEST * w - ROUNDING:
+                expected = f"a radius of at least {TIGHTEST:g} w = {TIGHTEST * w:.6g} m"
+                faults.append(_fault(f"corner {corner}: too sharp a curve", s, own_radius, expected))
+    return faults or _overlaps(network, straight, 4.0 * w + reach, w)
+
+
+def _overlaps(network: RoadNetwork, straight: float, least: float, w: float) -> list[InputError]:
+    """Return pairs of roads, of which one bends at least, that are less than `least` metres apart.
+
+    They are measured beyond the `straight` metres at their ends: there they may meet.
+    """
+    owner, along, place = _samples(network, straight, SAMPLED * w / 0.3)
+    found: dict[tuple[int, int], float] = {}
+    for one, other in pairs(*covered(place, place, 0.5 * least, max(least, 1e-9))):
+        low, high = owner[one], owner[other]
+        apart = (low != high) | (np.abs(along[one] - along[other]) >= FAR_ALONG * w)
+        apart &= network.bent[low] | network.bent[high]
+        first, second = one[apart], other[apart]
+        step = place[first] - place[second]
+        far = np.sqrt((step * step).sum(axis=-1))
+        for k in np.flatnonzero(far < least - ROUNDING).tolist():
+            pair = int(min(owner[first[k]], owner[second[k]])), int(max(owner[first[k]], owner[second[k]]))
+            found[pair] = min(found.get(pair, np.inf), float(far[k]))
+    faults: list[InputError] = []
+    for low, high in sorted(found, key=lambda pair: (pair[1], pair[0])):
+        s, other = (high, low) if network.bent[high] else (low, high)
+        problem = "comes too close to itself" if s == other else f"comes too close to segments[{other}]"
+        faults.append(
+            _fault(problem, s, found[low, high], f"at least {least:.6g} m between the middles of roads")
+        )
+    return faults
+
+
+def _samples(network: RoadNetwork, straight: float, apart: float) -> tuple[Ints, Floats, Floats]:
+    """Return points about `apart` metres apart: their segments (K,), metres along these (K,), places (K, 2)."""
+    owner: list[Ints] = []
+    along: list[Floats] = []
+    place: list[Floats] = []
+    for s, length in enumerate(network.lengths.tolist()):
+        count = int(max(length - 2.0 * straight, 0.0) / apart) + 2
+        low, high = min(straight, 0.5 * length), max(length - straight, 0.5 * length)
+        own = cast(Floats, np.linspace(low, high, count))
+        if network.bent[s]:
+            spots, _ = network.chains.places(s, own)
+        else:
+            spots = cast(Floats, network.points[network.ends[s, 0]] + own[:, None] * network.tangents[s])
+        owner.append(np.full(count, s))
+        along.append(own)
+        place.append(spots)
+    return np.concatenate(owner), np.concatenate(along), np.concatenate(place)
+
+
+def _fault(problem: str, s: int, value: float, expected: str) -> InputError:
+    return InputError(problem, field=f"segments[{s}]", value=value, expected=expected)

@@ -1,10 +1,15 @@
-"""Road networks: segments, straight or bent, between points of a plane, embedded by scale and rigid motion."""
+"""Road networks: segments, straight or bent, between points of a plane, embedded by scale and rigid motion.
+
+`Routes` are the shortest ways along their lanes.
+"""
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
-from functools import cached_property
+from functools import cached_property, cmp_to_key
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -14,22 +19,107 @@ import numpy.typing as npt
 from dubins_traffic import files
 from dubins_traffic.display import Pictured, count
 from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.chains import sides
+from dubins_traffic.roads.chains import Chains, Corners, Runs, Segment, sides, turned
 from dubins_traffic.roads.checks import check
-from dubins_traffic.roads.embedding import Embedding, Point
 from dubins_traffic.roads.formats import registry as formats
 from dubins_traffic.roads.formats import rnd
 from dubins_traffic.roads.formats.registry import MapFormat
-from dubins_traffic.roads.formats.rnd import Corners, Segment
-from dubins_traffic.roads.formats.rnd_json import write_json
-from dubins_traffic.roads.formats.rnd_text import write_lines
-from dubins_traffic.roads.routes import Routes, arms, shortest
+from dubins_traffic.roads.formats.rnd import write_json, write_lines
 from dubins_traffic.roads.surface import Surface
+
+Point = tuple[float, float]
+Line = tuple[Point, Point]
+
+
+@dataclass(frozen=True, slots=True)
+class Routes:
+    """Shortest routes to one intersection.
+
+    Attributes
+    ----------
+    next_lane : array (L,) of int64
+        The lane to take at the end of each lane; -1 where the lane ends in the intersection.
+    distance : array (L,) of float64
+        Metres from the start of each lane to the intersection; inf where no route leads there.
+    """
+
+    next_lane: Ints
+    distance: Floats
+
+    def follow(self, lane: int) -> list[int]:
+        """Return the lanes from `lane` to the intersection, both included; empty if no route leads there."""
+        if not self.distance[lane] < inf:
+            return []
+        path = [lane]
+        while self.next_lane[path[-1]] >= 0:
+            path.append(int(self.next_lane[path[-1]]))
+        return path
+
+
+def arms(sides: Sequence[Segment], ends: Ints, count: int) -> list[tuple[int, ...]]:
+    """Return the lanes out of each of `count` intersections, counter-clockwise by bearing from the lattice's x axis.
+
+    `sides` are the vectors (dx, dy, dx, dy) along each segment where it begins and where it ends.
+    """
+    out: list[list[tuple[float, float, int]]] = [[] for _ in range(count)]
+    for s, (ax, ay, bx, by) in enumerate(sides):
+        out[int(ends[s, 0])].append((ax, ay, 2 * s))
+        out[int(ends[s, 1])].append((-bx, -by, 2 * s + 1))
+    return [tuple(lane for _, _, lane in sorted(own, key=cmp_to_key(_turn))) for own in out]
+
+
+def _turn(p: tuple[float, float, int], q: tuple[float, float, int]) -> int:
+    """Compare two directions by bearing in [0, 2 pi), exactly on the lattice."""
+    lower_p = p[1] < 0 or (p[1] == 0 and p[0] < 0)
+    lower_q = q[1] < 0 or (q[1] == 0 and q[0] < 0)
+    if lower_p != lower_q:
+        return 1 if lower_p else -1
+    cross = p[0] * q[1] - p[1] * q[0]
+    return -1 if cross > 0 else 1
+
+
+def shortest(
+    target: int, lane_end: Sequence[int], lengths: Sequence[float], before: Sequence[Sequence[int]]
+) -> Routes:
+    """Return the shortest routes to the intersection `target` (Dijkstra, backwards over lanes).
+
+    Parameters
+    ----------
+    target : int
+        Number of the intersection.
+    lane_end, lengths : sequences (L,)
+        Intersection in which each lane ends, and its metres.
+    before : sequence (L,) of sequences
+        The lanes that may be left for each lane. Of equally short routes the lane of lowest number is taken.
+    """
+    count = len(lane_end)
+    distance = [inf] * count
+    follow = [-1] * count
+    heap: list[tuple[float, int]] = []
+    for lane in range(count):
+        if lane_end[lane] == target:
+            distance[lane] = lengths[lane]
+            heap.append((lengths[lane], lane))
+    heapq.heapify(heap)
+    while heap:
+        gone, lane = heapq.heappop(heap)
+        if gone > distance[lane]:
+            continue
+        for previous in before[lane]:
+            length = gone + lengths[previous]
+            closer = length < distance[previous]
+            if closer or (length == distance[previous] and lane < follow[previous]):
+                follow[previous] = lane
+            if closer:
+                distance[previous] = length
+                heapq.heappush(heap, (length, previous))
+    return Routes(np.array(follow, dtype=np.int64), np.array(distance, dtype=np.float64))
 
 
 @dataclass(frozen=True)
-class RoadNetwork(Embedding, Pictured):
+class RoadNetwork(Pictured):
     """A planar, connected network of roads; at most four meet at an intersection.
 
     Parameters
@@ -47,7 +137,7 @@ class RoadNetwork(Embedding, Pictured):
         Keys of the document that are not ours, kept.
     corners : sequence of sequences of (x, y, radius)
         The corners of each segment between its ends, in the lattice's frame and unit; each is rounded by an arc of
-        that radius, tangent to both sides (`roads.chain`). Empty where all are straight.
+        that radius, tangent to both sides (`roads.chains`). Empty where all are straight.
 
     Raises
     ------
@@ -288,6 +378,146 @@ class RoadNetwork(Embedding, Pictured):
     def lane_coordinates(self, lane: int, points: npt.ArrayLike) -> tuple[Floats, Floats]:
         """Return (s, l) of points (..., 2): metres along a lane from its start, and left of the centre line."""
         return self.surface.lane_coordinates(lane, points)
+
+    @property
+    def is_straight(self) -> bool:
+        """Whether no segment bends."""
+        return not self.corners
+
+    @cached_property
+    def chains(self) -> Chains:
+        """The pieces of the segments that bend."""
+        return Chains(self.segments, self.corners, self.length, self.transform)
+
+    @cached_property
+    def intersections(self) -> tuple[Point, ...]:
+        """Points of the lattice's frame where roads end, sorted by x, then y."""
+        points = {(x0, y0) for x0, y0, _, _ in self.segments} | {(x1, y1) for _, _, x1, y1 in self.segments}
+        return tuple(sorted(points))
+
+    @cached_property
+    def _numbers(self) -> dict[Point, int]:
+        return {point: v for v, point in enumerate(self.intersections)}
+
+    @cached_property
+    def points(self) -> Floats:
+        """World coordinates of the intersections, (V, 2), metres."""
+        return _fixed(self.to_world(np.array(self.intersections, dtype=np.float64)))
+
+    @cached_property
+    def ends(self) -> Ints:
+        """Numbers of the intersections at both ends of each segment, (S, 2)."""
+        rows = [(self._numbers[x0, y0], self._numbers[x1, y1]) for x0, y0, x1, y1 in self.segments]
+        ends = np.array(rows, dtype=np.int64)
+        ends.flags.writeable = False
+        return ends
+
+    @cached_property
+    def _steps(self) -> Floats:
+        """Lattice vectors from the first to the second end of each segment, (S, 2)."""
+        segment = np.array(self.segments, dtype=np.float64)
+        return segment[:, 2:] - segment[:, :2]
+
+    @cached_property
+    def lengths(self) -> Floats:
+        """Lengths of the segments, (S,), metres; a rigid motion does not change a bit of them."""
+        dx, dy = self._steps.T
+        straight = self.length * np.sqrt(dx * dx + dy * dy)
+        return _fixed(straight if self.is_straight else np.where(self.bent, self.chains.lengths, straight))
+
+    @cached_property
+    def bent(self) -> npt.NDArray[np.bool_]:
+        """Whether each segment bends, (S,)."""
+        return _fixed(np.array([bool(own) for own in self.corners] or [False] * len(self.segments)))
+
+    @cached_property
+    def tangents(self) -> Floats:
+        """Unit vectors along the segments at their first ends, (S, 2)."""
+        found = self._directions
+        if not self.is_straight:
+            found[self.bent] = self.chains.tangent[self.chains.first[:-1][self.bent]]
+        return _fixed(found)
+
+    @cached_property
+    def end_tangents(self) -> Floats:
+        """Unit vectors along the segments at their second ends, (S, 2): equal to `tangents` unless they bend."""
+        if self.is_straight:
+            return self.tangents
+        found = self._directions
+        found[self.bent] = self.chains.end_tangent[self.chains.first[1:][self.bent] - 1]
+        return _fixed(found)
+
+    @property
+    def _directions(self) -> Floats:
+        """Unit vectors from the first to the second end of each segment, (S, 2)."""
+        dx, dy = self._steps.T
+        norm = np.sqrt(dx * dx + dy * dy)
+        return turned(np.stack([dx / norm, dy / norm], axis=-1), *sincos(self.transform[2]))
+
+    @cached_property
+    def runs(self) -> Runs:
+        """The longest straight run of each segment."""
+        straight = Runs(
+            self.points[self.ends[:, 0]], self.points[self.ends[:, 1]], self.tangents, self.lengths
+        )
+        return straight if self.is_straight else self.chains.runs(straight)
+
+    @cached_property
+    def degrees(self) -> Ints:
+        """Number of roads at each intersection, (V,)."""
+        degrees = np.bincount(self.ends.ravel(), minlength=len(self.intersections)).astype(np.int64)
+        degrees.flags.writeable = False
+        return degrees
+
+    def lane_ends(self, lane: int) -> tuple[int, int]:
+        """Return the intersections in which a lane begins and ends."""
+        first, second = self.ends[lane >> 1].tolist()
+        return (second, first) if lane & 1 else (first, second)
+
+    def to_world(self, points: npt.ArrayLike) -> Floats:
+        """Map lattice points (..., 2) to the world."""
+        tx, ty, theta = self.transform
+        return turned(self.length * np.asarray(points, dtype=np.float64), *sincos(theta)) + np.array([tx, ty])
+
+    def to_lattice(self, points: npt.ArrayLike) -> Floats:
+        """Map world points (..., 2) to the lattice, where they need not be whole."""
+        tx, ty, theta = self.transform
+        c, s = sincos(theta)
+        return turned(np.asarray(points, dtype=np.float64) - np.array([tx, ty]), c, -s) / self.length
+
+    def lane_places(self, lane: int, along: Floats) -> tuple[Floats, Floats]:
+        """Return points (N, 2) so many metres along the middle of a lane's road, and unit vectors (N, 2) along it."""
+        s, back = lane >> 1, bool(lane & 1)
+        if self.bent[s]:
+            point, way = self.chains.places(s, self.lengths[s] - along if back else along)
+            return point, -way if back else way
+        way = -self.tangents[s] if back else self.tangents[s]
+        start = self.points[self.ends[s, 1 if back else 0]]
+        return start + along[:, None] * way, np.broadcast_to(way, (len(along), 2))
+
+    def lane_line(self, lane: int, offset: float) -> Line:
+        """Return the ends of the line parallel to a lane, `offset` m left of the centre line (the right lane: -w)."""
+        first, last = self.lane_curve(lane, offset)[[0, -1]].tolist()
+        return (first[0], first[1]), (last[0], last[1])
+
+    def lane_curve(self, lane: int, offset: float, sagitta: float = 0.01) -> Floats:
+        """Return the corners (K, 2) of a line parallel to a lane, `offset` metres left of the centre line.
+
+        On arcs it leaves the parallel by about `sagitta` metres at most; that of a straight lane has its two ends.
+        """
+        s = lane >> 1
+        left = -offset if lane & 1 else offset
+        if self.bent[s]:
+            line, way = self.chains.places(s, self.chains.marks(s, sagitta))
+        else:
+            line, way = self.points[self.ends[s]], self.tangents[[s, s]]
+        drawn = np.stack([line[:, 0] - left * way[:, 1], line[:, 1] + left * way[:, 0]], axis=-1)
+        return drawn[::-1] if lane & 1 else drawn
+
+
+def _fixed(array: npt.NDArray[Any]) -> Any:
+    array.flags.writeable = False
+    return array
 
 
 def _number(value: float) -> float | int:

@@ -1,15 +1,16 @@
 """Where points lie on a network, in NumPy: nearest segment and intersection, on the road or not, lane coordinates.
 
 The box around a network is cut into uniform cells; each keeps what may be nearest to a point in it, so that
-looking a point up costs the same on a network of any size.
+looking a point up costs the same on a network of any size. Finer ones, a `RoadRaster`, say at a glance whether a point
+lies on the road.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 from math import ceil, sqrt
-from typing import TYPE_CHECKING, NamedTuple, cast
+from typing import TYPE_CHECKING, Final, NamedTuple, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -21,9 +22,14 @@ CELLS_PER_SEGMENT = 8.0
 POINTS_AT_ONCE = 1 << 15
 FEW = 1 << 14
 """Up to so many pairs of a cell and an item all are looked at, which is sooner done."""
+PAIRS_AT_ONCE = 1 << 21
+RASTER_CELLS_PER_SEGMENT: Final = 256.0
+SAGITTA: Final = 0.1
+"""How far the bars that stand for an arc may leave it, in half widths of the road."""
+
 
 if TYPE_CHECKING:
-    from dubins_traffic.roads.cells import RoadRaster
+    from dubins_traffic.roads.surface import RoadRaster
 
 Distance2 = Callable[[Floats, Floats, Ints], Floats]
 
@@ -248,3 +254,132 @@ def _gather(start: Ints, item: Ints, order: Ints) -> tuple[Ints, Ints]:
     new = np.concatenate([[0], np.cumsum(count)])
     place = cast(Ints, np.repeat(start[:-1][order] - new[:-1], count) + np.arange(new[-1]))
     return new, item[place]
+
+
+class RoadRaster(NamedTuple):
+    """Cells over the box of `Surface.cells`: cell (cx, cy) has the number cy * nx + cx.
+
+    ``pave`` holds the number of the only segment whose road meets the cell, or a `road_raster.CELL`.
+    """
+
+    scale: float
+    nx: int
+    ny: int
+    pave: Ints
+
+
+def covered(start: Floats, end: Floats, pad: float, size: float) -> tuple[Ints, Ints, Ints]:
+    """Return the cells that segments touch when grown by `pad`: a superset, as rows (item, column, row).
+
+    Parameters
+    ----------
+    start, end : array (S, 2)
+        Ends of the segments.
+    pad : float
+        Distance by which they are grown.
+    size : float
+        Side of a cell; cell (0, 0) begins in the origin.
+    """
+    rounding = 1e-9 * (size + float(np.abs(start).max(initial=0.0)))
+    pad += rounding
+    swap = start[:, 0] > end[:, 0]
+    low = np.where(swap[:, None], end, start)
+    high = np.where(swap[:, None], start, end)
+    first = np.floor((low[:, 0] - pad) / size).astype(np.int64)
+    last = np.floor((high[:, 0] + pad) / size).astype(np.int64)
+    item, column = _spread(first, last)
+    run = high[item, 0] - low[item, 0]
+    upright = run <= rounding
+    slope = np.divide(high[item, 1] - low[item, 1], run, out=np.zeros_like(run), where=~upright)
+    left = np.clip(column * size - pad - low[item, 0], 0.0, run)
+    right = np.clip((column + 1) * size + pad - low[item, 0], 0.0, run)
+    y0 = low[item, 1] + slope * left
+    y1 = cast(Floats, np.where(upright, high[item, 1], low[item, 1] + slope * right))
+    bottom = np.floor((np.minimum(y0, y1) - pad) / size).astype(np.int64)
+    top = np.floor((np.maximum(y0, y1) + pad) / size).astype(np.int64)
+    strip, row = _spread(bottom, top)
+    return item[strip], column[strip], row
+
+
+def pairs(item: Ints, column: Ints, row: Ints) -> Iterator[tuple[Ints, Ints]]:
+    """Yield the pairs of items that share a cell, in blocks; a pair may come more than once."""
+    height = int(row.max(initial=0)) - int(row.min(initial=0)) + 1
+    key = (column - column.min(initial=0)) * height + row
+    order = np.lexsort((item, key))
+    key, item = key[order], item[order]
+    count = len(key)
+    after = cast(Ints, np.searchsorted(key, key, side="right") - np.arange(count) - 1)
+    total = cast(Ints, np.concatenate([[0], np.cumsum(after)]))
+    begin = 0
+    while begin < count:
+        full = int(total[begin]) + PAIRS_AT_ONCE
+        stop = int(np.searchsorted(total, full, side="right")) - 1
+        stop = min(max(stop, begin + 1), count)
+        near = np.repeat(np.arange(begin, stop), after[begin:stop])
+        step = np.arange(len(near)) - np.repeat(total[begin:stop] - total[begin], after[begin:stop])
+        yield item[near], item[near + 1 + step]
+        begin = stop
+
+
+def _spread(first: Ints, last: Ints) -> tuple[Ints, Ints]:
+    """Return (k, value) for every k and every value in first[k]..last[k]."""
+    count = last - first + 1
+    k = np.repeat(np.arange(len(first)), count)
+    begin = np.repeat(np.cumsum(count) - count, count)
+    return k, first[k] + np.arange(len(k)) - begin
+
+
+class _Cell(NamedTuple):
+    """What stands in a cell of `RoadRaster.pave` in place of the number of a segment."""
+
+    OFF: int = -1
+    """No point of it is on the road."""
+    ON: int = -2
+    """All are."""
+    MIXED: int = -3
+    """The roads of several segments meet it."""
+
+
+CELL: Final = _Cell()
+
+
+def road_raster(surface: Surface, half_width: float) -> RoadRaster:
+    """Return the raster of roads `half_width` metres to either side of the segments (kept for next time)."""
+    kept = surface.rasters.get(half_width)
+    if kept is None:
+        kept = surface.rasters[half_width] = _drawn(surface, half_width)
+    return kept
+
+
+def _drawn(surface: Surface, half_width: float) -> RoadRaster:
+    cells = surface.cells
+    width, height = cells.nx / cells.scale, cells.ny / cells.scale
+    finest = sqrt(width * height / (RASTER_CELLS_PER_SEGMENT * len(surface.lengths)))
+    side = max(0.35 * half_width, finest)
+    nx, ny = ceil(width / side), ceil(height / side)
+    slack = 1e-9 * (side + half_width + abs(cells.x0) + abs(cells.y0) + width + height)
+    origin = np.array([cells.x0, cells.y0])
+    owner, start, end = surface.bars(slack + SAGITTA * half_width)
+    spread = 0.0 if surface.chains is None else SAGITTA * half_width
+    item, cx, cy = covered(start - origin, end - origin, half_width + slack + spread, side)
+    keep = (cx >= 0) & (cx < nx) & (cy >= 0) & (cy < ny)
+    item, cx, cy = owner[item[keep]], cx[keep], cy[keep]
+    if surface.chains is not None:
+        number = np.unique((item * ny + cy) * nx + cx)
+        item, cy, cx = number // (ny * nx), number // nx % ny, number % nx
+    x = cast(Floats, cells.x0 + (cx + 0.5) * side)
+    y = cast(Floats, cells.y0 + (cy + 0.5) * side)
+    distance: Floats = np.sqrt(surface.distance2(x, y, item))
+    reach = sqrt(0.5) * side + slack
+    keep = distance <= half_width + reach
+    number, item, x, y = (cy * nx + cx)[keep], item[keep], x[keep], y[keep]
+    paved = np.full(nx * ny, CELL.OFF, dtype=np.int64)
+    paved[number] = item
+    paved[np.bincount(number, minlength=nx * ny) > 1] = CELL.MIXED
+    whole = np.ones(len(number), dtype=np.bool_)
+    inner = max(0.0, half_width - slack)
+    for dx in (-0.5, 0.5):
+        for dy in (-0.5, 0.5):
+            whole &= surface.distance2(x + dx * side, y + dy * side, item) < inner * inner
+    paved[number[whole]] = CELL.ON
+    return RoadRaster(1.0 / side, nx, ny, paved)

@@ -12,10 +12,8 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, join, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.roads.cells import RoadRaster
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.road_raster import road_raster
-from dubins_traffic.roads.surface import Cells
+from dubins_traffic.roads.surface import Cells, RoadRaster, road_raster
 
 
 @record
@@ -124,7 +122,7 @@ class RoadTable(Tables):
     seg_item, vert_item : arrays
         What may be nearest to a point of the cell, in ascending order.
     pave : array
-        What the road makes of a cell, see `roads.road_raster`.
+        What the road makes of a cell, see `roads.surface`.
     """
 
     half_width: Floats

@@ -5,8 +5,7 @@ from __future__ import annotations
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.roads.curves import bent_foot, bent_place
-from dubins_traffic.roads.lookup import lane_direction_at, nearest_segment
+from dubins_traffic.roads.lookup import bent_foot, bent_place, lane_direction_at, nearest_segment
 from dubins_traffic.roads.table import RoadTable
 
 FAR = 1 << 40

@@ -4,7 +4,7 @@ Cars move little in a tick. So with a car's labels regions are kept in which the
 rectangle about the car, a ring about the nearest vertex, and a strip of its lane. Within them only the car's progress,
 and whether it is still or lingers, is found anew.
 
-The regions stand in `Memory.kept`, in columns (`kernels.columns`), and the loops over cars have no branches, so that
+The regions stand in `Memory.kept`, in columns (`kernels.records`), and the loops over cars have no branches, so that
 the compiler works on several cars at once.
 """
 
@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dubins_traffic.cars.rows import TOGETHER, copy_together
+from dubins_traffic.cars.clip_and_move import TOGETHER, copy_together
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline, jit_look

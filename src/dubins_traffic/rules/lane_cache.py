@@ -7,8 +7,14 @@ from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import BLOCK
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
-from dubins_traffic.roads.curves import nearest_piece
-from dubins_traffic.roads.lookup import CERTAIN, INFINITE, ValidCell, lane_direction, straight_start
+from dubins_traffic.roads.lookup import (
+    CERTAIN,
+    INFINITE,
+    ValidCell,
+    lane_direction,
+    nearest_piece,
+    straight_start,
+)
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.tables import TrialRules, ValidRegions
 

@@ -12,7 +12,7 @@ from dubins_traffic.cars.tables import ObstacleTable, Part
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.roads.curves import bent_coordinates, bent_distance2
+from dubins_traffic.roads.lookup import bent_coordinates, bent_distance2
 from dubins_traffic.roads.table import RoadTable, Segment
 
 STEP = 0.05

@@ -11,8 +11,7 @@ import numpy as np
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats, Ints
-from dubins_traffic.kernels.columns import columns
-from dubins_traffic.kernels.records import Grid, Rows, record, table
+from dubins_traffic.kernels.records import Grid, Rows, columns, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.roads.lookup import ValidCell
 from dubins_traffic.roads.table import RoadTable

@@ -26,7 +26,7 @@ from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.problem.senses import Laser
+from dubins_traffic.problem.parts import Laser
 from dubins_traffic.protocols import Clock, Controller, Simulator, Transport
 from dubins_traffic.record.reader import Record
 from dubins_traffic.runs.plan import check_data_file, concluded, load_runnable

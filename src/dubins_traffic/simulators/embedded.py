@@ -9,9 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.cars.body import DUBINS
-from dubins_traffic.cars.motion import Motion, step
-from dubins_traffic.cars.partners import Meeting, enlarged, workspace
-from dubins_traffic.cars.rows import rows
+from dubins_traffic.cars.clip_and_move import rows
+from dubins_traffic.cars.motion import Meeting, Motion, enlarged, step, workspace
 from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError

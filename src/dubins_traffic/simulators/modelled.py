@@ -16,10 +16,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from dubins_traffic import outside
+from dubins_traffic.cars.clip_and_move import clip
 from dubins_traffic.cars.dynamics import MOST_ARCS, Arc, MotionModel, Stops, begun
-from dubins_traffic.cars.motion import OUTCOME, Motion, step_part
-from dubins_traffic.cars.partners import Meeting, enlarged
-from dubins_traffic.cars.rows import clip
+from dubins_traffic.cars.motion import OUTCOME, Meeting, Motion, enlarged, step_part
 from dubins_traffic.cars.state import EGO, Contact
 from dubins_traffic.errors import ControllerError
 from dubins_traffic.kernels.arrays import Floats

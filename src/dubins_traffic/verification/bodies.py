@@ -9,7 +9,7 @@ from typing import Final
 
 import numpy as np
 
-from dubins_traffic.cars.partners import PARTED
+from dubins_traffic.cars.motion import PARTED
 from dubins_traffic.cars.state import Contact, Frames, State
 from dubins_traffic.cars.touching import Bodies
 from dubins_traffic.kernels.arrays import Floats

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.problem.senses import Disturbances
+from dubins_traffic.problem.parts import Disturbances
 from dubins_traffic.protocols import Ending
 from dubins_traffic.record.reader import Record
 from dubins_traffic.scoring.blocks import joined

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from dubins_traffic.cars.rows import clip, rows
+from dubins_traffic.cars.clip_and_move import clip, rows
 from dubins_traffic.cars.state import Contact, Frames, Labels, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.cars.touching import Touching

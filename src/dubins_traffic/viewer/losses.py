@@ -10,9 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.roads.maps.losses import Fate, Losses
+from dubins_traffic.roads.maps.losses import Fate, Losses, Reason
 from dubins_traffic.roads.maps.polylines import simplified
-from dubins_traffic.roads.maps.reasons import Reason
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.canvas import figure_class
 from dubins_traffic.viewer.plot import write_figure

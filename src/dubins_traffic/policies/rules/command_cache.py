@@ -11,7 +11,7 @@ from math import sqrt
 
 import numpy as np
 
-from dubins_traffic.cars.rows import TOGETHER, copy_together
+from dubins_traffic.cars.clip_and_move import TOGETHER, copy_together
 from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats
 from dubins_traffic.kernels.compile import jit_inline, jit_look

@@ -6,8 +6,7 @@
 from __future__ import annotations
 
 from dubins_traffic.kernels.arrays import BLOCK, Floats
-from dubins_traffic.kernels.columns import columns
-from dubins_traffic.kernels.records import Rows, record, table
+from dubins_traffic.kernels.records import Rows, columns, record, table
 
 NOWHERE = 1e9
 """Longer than any way, metres: a cached command that begins so far along its way is never valid."""

@@ -21,15 +21,17 @@ from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.standing import LINE, SURE
 from dubins_traffic.policies.rules.tables import VIOLATION, Traffic
 from dubins_traffic.policies.safety import NEAR, may_hit, may_meet
-from dubins_traffic.roads.curves import bent_distance2, nearest_piece, piece_foot
 from dubins_traffic.roads.lookup import (
     bends_before,
+    bent_distance2,
     lane_coordinates,
     lane_direction,
     lane_direction_at,
     lane_end,
     lane_end_direction,
     lane_start,
+    nearest_piece,
+    piece_foot,
     tightness,
     vertex_distance2,
 )

@@ -1,15 +1,33 @@
-"""What the formats of other programs have in common: they are read into a road map, which is reduced to a network."""
+"""What the formats of other programs have in common: they are read into a road map, which is reduced to a network.
+
+A map written by us says, to be found again exactly, what other programs pass over, in processing instructions:
+``<?dubins-traffic frame LENGTH X Y THETA?>`` says how the network lay on its lattice, and
+``<?dubins-traffic corners NAME X Y RADIUS ...?>`` how a road bends. They are believed as far as the lines in the file
+lie where they say (`roads.maps.from_rnd`).
+"""
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import pi
+from typing import Any, Literal
 
+from dubins_traffic.errors import InputError
+from dubins_traffic.roads.maps.from_rnd import corners_text, read_corners, read_frame, road_map
 from dubins_traffic.roads.maps.model import RoadMap
-from dubins_traffic.roads.maps.ours import road_map
 from dubins_traffic.roads.maps.reduction import Reduction, reduction
 from dubins_traffic.roads.maps.settings import ImportSettings
+
+TARGET = "dubins-traffic"
+_HINT = re.compile(rf"<\?{TARGET} (\w+) ([^?>]*)\?>")
+_ROOT = re.compile(r"<[A-Za-z_]")
+STOP_BEFORE = 1.0
+"""Metres from a junction to the lines where one stops: its radius R."""
+STRAIGHT_ON = pi / 4
+"""Roads that go on within this angle go straight on."""
 
 
 class ForeignFormat(ABC):
@@ -53,3 +71,44 @@ class WrittenFormat(ForeignFormat):
     def write(self, document: Mapping[str, Any]) -> str:
         """Return the text of an RND document."""
         return self.write_map(road_map(document))
+
+
+def hints_text(made: RoadMap, names: Sequence[str]) -> str:
+    """Return the instructions for a map whose roads are called so in the file; names are without blanks."""
+    if made.frame is None:
+        return ""
+    lines = [f"<?{TARGET} frame {made.frame.text()}?>"]
+    for name, road in zip(names, made.roads, strict=True):
+        if road.corners:
+            lines.append(f"<?{TARGET} corners {name} {corners_text(road.corners)}?>")
+    return "\n".join(lines) + "\n"
+
+
+def with_hints(found: RoadMap, text: str, file: str | None) -> RoadMap:
+    """Return a map with what the instructions before the root of its text say; InputError if they are broken."""
+    root = _ROOT.search(text)
+    frame = found.frame
+    corners: dict[str, str] = {}
+    for kind, value in _HINT.findall(text[: root.start()] if root else ""):
+        if kind == "frame":
+            frame = read_frame(value, file)
+        elif kind == "corners":
+            name, _, rest = value.partition(" ")
+            corners[name] = rest
+        else:
+            raise InputError("unknown instruction", file=file, value=kind, expected="frame or corners")
+    if frame is None:
+        return found
+    roads = [
+        replace(road, corners=read_corners(corners[road.name], file)) if road.name in corners else road
+        for road in found.roads
+    ]
+    return replace(found, roads=tuple(roads), frame=frame)
+
+
+def turn(into: float, out: float) -> Literal["straight", "left", "right"]:
+    """Return where a lane with the bearing `out` leads from one with the bearing `into`, both radians."""
+    angle = (out - into + pi) % (2.0 * pi) - pi
+    if abs(angle) < STRAIGHT_ON:
+        return "straight"
+    return "left" if angle > 0.0 else "right"

@@ -1,24 +1,25 @@
-"""OpenDRIVE (`.xodr`): lines, arcs, clothoids and cubics along the middle of roads, lanes on both sides."""
+"""OpenDRIVE (`.xodr`): lines, arcs, clothoids and cubics along the middle of roads, lanes on both sides.
+
+Roads are written from centre to centre, made of lines and arcs.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from xml.etree.ElementTree import Element
+from math import atan2, ceil, cos, sin, sqrt
+from typing import NamedTuple
+from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.roads.formats.foreign import WrittenFormat
-from dubins_traffic.roads.formats.hints import with_hints
-from dubins_traffic.roads.formats.opendrive_text import write_opendrive
-from dubins_traffic.roads.formats.xml_text import Reader, parse, place, root_name
-from dubins_traffic.roads.maps.geometry import Placed, clothoid, cubic, cubic_over, straight
-from dubins_traffic.roads.maps.junctions import End, joined_where_equal, junctions_of
+from dubins_traffic.roads.chains import Piece, chain
+from dubins_traffic.roads.formats.foreign import WrittenFormat, hints_text, with_hints
+from dubins_traffic.roads.formats.xml_text import Reader, document, number_text, parse, place, root_name
+from dubins_traffic.roads.maps.junctions import End, OneWay, Union, joined_where_equal, junctions_of, paired
 from dubins_traffic.roads.maps.model import Road, RoadMap
-from dubins_traffic.roads.maps.pairing import OneWay, paired
 from dubins_traffic.roads.maps.polylines import along, cleaned
-from dubins_traffic.roads.maps.union import Union
 
 LANE_WIDTH = 3.5
 """Width of a lane that gives none."""
@@ -27,6 +28,10 @@ LONGEST = 1e6
 """Metres of one piece."""
 WIDEST_GAP = 1.0
 """Metres between the end of a piece and the beginning of the next: they meet, but for what rounding leaves."""
+SAGITTA = 2e-3
+"""Chords leave the curve by about this many metres."""
+MOST = 4000
+"""Most chords of one piece."""
 
 
 class OpenDrive(WrittenFormat):
@@ -62,8 +67,20 @@ class OpenDrive(WrittenFormat):
         return with_hints(RoadMap(junctions, (*roads, *paired(single))), text, file).checked(file)
 
     def write_map(self, made: RoadMap) -> str:
-        """Return the text of a map."""
-        return write_opendrive(made)
+        """Return the text of a map: roads ``0``, ``1``, ..., and junctions where more than two of them meet."""
+        root = Element("OpenDRIVE")
+        SubElement(root, "header", revMajor="1", revMinor="6", name="dubins-traffic", version="1")
+        numbers = {name: str(k) for k, name in enumerate(made.junctions)}
+        meet: dict[str, list[tuple[int, str]]] = {name: [] for name in made.junctions}
+        for k, road in enumerate(made.roads):
+            meet[road.first].append((k, "start"))
+            meet[road.last].append((k, "end"))
+        for k, road in enumerate(made.roads):
+            _road(root, k, road, made, numbers, meet)
+        for name, ends in meet.items():
+            if len(ends) > 2:
+                SubElement(root, "junction", id=numbers[name], name=name)
+        return document(root, hints_text(made, [str(k) for k in range(len(made.roads))]))
 
 
 def _joined(
@@ -196,3 +213,122 @@ def _lanes(reader: Reader, road: Element) -> tuple[int, int, float]:
     ]
     usual = max(widths, default=LANE_WIDTH)
     return len(sides[0]), len(sides[1]), usual if usual > 0.0 else LANE_WIDTH
+
+
+def _road(
+    root: Element,
+    number: int,
+    road: Road,
+    made: RoadMap,
+    numbers: dict[str, str],
+    meet: dict[str, list[tuple[int, str]]],
+) -> None:
+    first, last = made.junctions[road.first], made.junctions[road.last]
+    pieces = chain((first.x, first.y), road.corners or (), (last.x, last.y))
+    length = sum(piece.length for piece in pieces)
+    element = SubElement(
+        root, "road", id=str(number), name=road.name, junction="-1", length=number_text(length)
+    )
+    link = SubElement(element, "link")
+    for tag, at, here in (("predecessor", road.first, "start"), ("successor", road.last, "end")):
+        others = [end for end in meet[at] if end != (number, here)]
+        if len(others) > 1:
+            SubElement(link, tag, elementType="junction", elementId=numbers[at])
+        elif others:
+            other, contact = others[0]
+            SubElement(link, tag, elementType="road", elementId=str(other), contactPoint=contact)
+    _plan(element, pieces)
+    _write_lanes(element, road.lane_width)
+
+
+def _plan(road: Element, pieces: tuple[Piece, ...]) -> None:
+    plan = SubElement(road, "planView")
+    s = 0.0
+    for piece in pieces:
+        values = {
+            "s": s,
+            "x": piece.x,
+            "y": piece.y,
+            "hdg": atan2(piece.ty, piece.tx),
+            "length": piece.length,
+        }
+        geometry = SubElement(plan, "geometry", {name: number_text(value) for name, value in values.items()})
+        if piece.side == 0.0:
+            SubElement(geometry, "line")
+        else:
+            SubElement(geometry, "arc", curvature=number_text(piece.side / piece.radius))
+        s += piece.length
+
+
+def _write_lanes(road: Element, width: float) -> None:
+    section = SubElement(SubElement(road, "lanes"), "laneSection", s="0")
+    for side, lane, kind in (("left", "1", "driving"), ("center", "0", "none"), ("right", "-1", "driving")):
+        element = SubElement(SubElement(section, side), "lane", id=lane, type=kind, level="false")
+        if lane != "0":
+            SubElement(element, "width", sOffset="0", a=number_text(width), b="0", c="0", d="0")
+        SubElement(element, "roadMark", sOffset="0", type="broken" if lane == "0" else "solid", width="0.1")
+
+
+class Placed(NamedTuple):
+    """Where a piece begins: x, y, heading (radians), and its length, metres."""
+
+    x: float
+    y: float
+    heading: float
+    length: float
+
+
+def straight(place: Placed) -> Floats:
+    """Return both ends of a line."""
+    return _moved(place, np.array([[0.0, 0.0], [place.length, 0.0]]))
+
+
+def clothoid(place: Placed, begin: float, end: float) -> Floats:
+    """Return points on a piece whose curvature changes evenly from `begin` to `end`; equal ones are an arc's."""
+    count = _count(place.length, max(abs(begin), abs(end)))
+    s = np.linspace(0.0, place.length, 2 * count + 1)
+    turn = begin * s + 0.5 * (end - begin) * s * s / max(place.length, 1e-300)
+    # Simpson's rule on each of `count` stretches.
+    step = place.length / count
+    steps = [
+        step / 6.0 * (each[:-1:2] + 4.0 * each[1::2] + each[2::2]) for each in (np.cos(turn), np.sin(turn))
+    ]
+    points = np.concatenate([np.zeros((1, 2)), np.cumsum(np.stack(steps, axis=-1), axis=0)])
+    return _moved(place, points)
+
+
+def cubic(place: Placed, u: Floats, v: Floats, last: float) -> Floats:
+    """Return points on (u(p), v(p)), p from 0 to `last`: cubics by their four coefficients, constant first."""
+    p = np.linspace(0.0, last, 65)
+    for _ in range(3):
+        points = np.stack([_value(u, p), _value(v, p)], axis=-1)
+        step = np.diff(points, axis=0)
+        bent = np.abs(step[:-1, 0] * step[1:, 1] - step[:-1, 1] * step[1:, 0])
+        off = 0.25 * bent / np.maximum(np.sqrt((step * step).sum(axis=1))[:-1], 1e-300)
+        if float(off.max(initial=0.0)) <= SAGITTA or len(p) >= MOST:
+            break
+        p = np.linspace(0.0, last, 4 * (len(p) - 1) + 1)
+    return _moved(place, np.stack([_value(u, p), _value(v, p)], axis=-1))
+
+
+def cubic_over(place: Placed, v: Floats) -> Floats:
+    """Return points on v(u), u from 0 until the piece is as long as it should be."""
+    u = np.linspace(0.0, place.length, 513)
+    points = np.stack([u, _value(v, u)], axis=-1)
+    step = np.diff(points, axis=0)
+    along = np.concatenate([[0.0], np.cumsum(np.sqrt((step * step).sum(axis=1)))])
+    return cubic(place, np.array([0.0, 1.0, 0.0, 0.0]), v, float(np.interp(place.length, along, u)))
+
+
+def _value(c: Floats, p: Floats) -> Floats:
+    return c[0] + p * (c[1] + p * (c[2] + p * c[3]))
+
+
+def _count(length: float, curvature: float) -> int:
+    return min(MOST, max(16, ceil(length / sqrt(8.0 * SAGITTA / max(curvature, 1e-12)))))
+
+
+def _moved(place: Placed, points: Floats) -> Floats:
+    c, s = cos(place.heading), sin(place.heading)
+    x, y = points[:, 0], points[:, 1]
+    return np.stack([place.x + c * x - s * y, place.y + s * x + c * y], axis=-1)

@@ -1,19 +1,29 @@
-"""OpenStreetMap (`.osm`): ways that are roads, cut where they meet. It is read only."""
+"""OpenStreetMap (`.osm`): ways that are roads, cut where they meet. It is read only.
+
+What OSM files hold, Lanelet2's among them, is read by `read_osm`: nodes, ways and relations with tags, and where nodes
+lie in metres, by the transverse Mercator projection of UTM, WGS 84.
+
+Source of the projection: Krueger's series to the fourth order in the third flattening; see Karney, Transverse Mercator
+with an accuracy of a few nanometers, 2011.
+"""
 
 from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Mapping
 from itertools import pairwise
+from math import asinh, atan, atan2, atanh, cos, cosh, degrees, hypot, radians, sin, sinh, sqrt, tan
+from typing import NamedTuple
 from xml.etree.ElementTree import Element
 
 import numpy as np
 
 from dubins_traffic.display import count
 from dubins_traffic.errors import InputError
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.formats.foreign import ForeignFormat
-from dubins_traffic.roads.formats.osm_text import Osm, has_lanelets, read_osm, tags
-from dubins_traffic.roads.formats.xml_text import root_name
+from dubins_traffic.roads.formats.xml_text import Reader, parse, place, root_name
 from dubins_traffic.roads.maps.model import Junction, Road, RoadMap
 
 LANE_WIDTH = 3.2
@@ -28,6 +38,25 @@ _NUMBER = re.compile(r"\d{1,3}(\.\d{1,6})?")
 _FEET = re.compile(r"(\d{1,3}(?:\.\d{1,6})?)\s*(?:ft|feet|foot|')\s*(\d*)")
 _FOOT = 0.3048
 """Metres."""
+EQUATOR = 6378137.0
+FLATTENING = 1.0 / 298.257223563
+SHRUNK = 0.9996
+"""Scale of the middle meridian of a zone."""
+_N = FLATTENING / (2.0 - FLATTENING)
+_E = sqrt(FLATTENING * (2.0 - FLATTENING))
+_A = EQUATOR / (1.0 + _N) * (1.0 + _N**2 / 4.0 + _N**4 / 64.0)
+_THERE = (
+    _N / 2 - 2 * _N**2 / 3 + 5 * _N**3 / 16 + 41 * _N**4 / 180,
+    13 * _N**2 / 48 - 3 * _N**3 / 5 + 557 * _N**4 / 1440,
+    61 * _N**3 / 240 - 103 * _N**4 / 140,
+    49561 * _N**4 / 161280,
+)
+_BACK = (
+    _N / 2 - 2 * _N**2 / 3 + 37 * _N**3 / 96 - _N**4 / 360,
+    _N**2 / 48 + _N**3 / 15 - 437 * _N**4 / 1440,
+    17 * _N**3 / 480 - 37 * _N**4 / 840,
+    4397 * _N**4 / 161280,
+)
 
 
 class OpenStreetMap(ForeignFormat):
@@ -105,3 +134,131 @@ def _metres(text: str) -> float:
 def _stops(osm: Osm, cuts: set[str]) -> set[str]:
     """Return the nodes at which all stop: tagged so themselves."""
     return {node for node in cuts if osm.stops.get(node) == "all"}
+
+
+class Osm(NamedTuple):
+    """An OSM file; places of nodes are metres, from the first node on unless the file has metres itself.
+
+    `stops` says of nodes with a stop sign for whom it is: ``all``, ``minor``, or nothing.
+    """
+
+    reader: Reader
+    nodes: Mapping[str, tuple[float, float]]
+    ways: Mapping[str, Element]
+    relations: Mapping[str, Element]
+    stops: Mapping[str, str]
+
+    def refs(self, way: Element) -> list[str]:
+        """Return the nodes of a way; InputError if one is missing, or there are fewer than two."""
+        found = [self.reader.text(each, "ref") for each in way.findall("nd")]
+        for name in found:
+            if name not in self.nodes:
+                raise self.reader.fault("no such node", way, name, "the id of a node")
+        if len(found) < 2:
+            raise self.reader.fault("no line", way, len(found), "two nodes or more")
+        return found
+
+    def line(self, way: Element) -> Floats:
+        """Return the places of the nodes of a way."""
+        return np.array([self.nodes[name] for name in self.refs(way)])
+
+
+def read_osm(text: str, file: str | None = None) -> Osm:
+    """Return what an OSM text holds; InputError if it is broken."""
+    root = parse(text, "osm", file)
+    reader = Reader(file)
+    nodes = reader.unique(iter(root.findall("node")))
+    ways = reader.unique(iter(root.findall("way")))
+    relations = reader.unique(iter(root.findall("relation")))
+    signs = {name: tags(each) for name, each in nodes.items() if len(each)}
+    stops = {name: own.get("stop", "") for name, own in signs.items() if own.get("highway") == "stop"}
+    return Osm(reader, _places(reader, nodes), ways, relations, stops)
+
+
+def has_lanelets(text: str) -> bool:
+    """Tell whether something in an OSM text is a lanelet."""
+    return 'v="lanelet"' in text or "v='lanelet'" in text
+
+
+def tags(element: Element) -> dict[str, str]:
+    """Return the tags of an element."""
+    return {each.get("k", ""): each.get("v", "") for each in element.findall("tag")}
+
+
+def _places(reader: Reader, nodes: Mapping[str, Element]) -> dict[str, tuple[float, float]]:
+    own = {name: tags(each) for name, each in nodes.items()}
+    if own and all("local_x" in each and "local_y" in each for each in own.values()):
+        return {
+            name: (
+                reader.parsed(each["local_x"], f"node[{name}]"),
+                reader.parsed(each["local_y"], f"node[{name}]"),
+            )
+            for name, each in own.items()
+        }
+    found = {
+        name: (_degrees(reader, each, "lat", 85.0), _degrees(reader, each, "lon", 180.0))
+        for name, each in nodes.items()
+    }
+    if not found:
+        return {}
+    first = next(iter(found.values()))
+    meridian = middle_meridian(first[1])
+    if any(abs(longitude - meridian) > 20.0 for _, longitude in found.values()):
+        raise InputError("too wide", file=reader.file, expected="a map of one town")
+    x0, y0 = to_metres(*first, meridian)
+    placed = {name: to_metres(*each, meridian) for name, each in found.items()}
+    return {name: (x - x0, y - y0) for name, (x, y) in placed.items()}
+
+
+def _degrees(reader: Reader, node: Element, name: str, most: float) -> float:
+    value = reader.number(node, name)
+    if abs(value) > most:
+        field = f"{place(node)}.{name}"
+        raise InputError(
+            "out of range", file=reader.file, field=field, value=value, expected=f"degrees up to {most:g}"
+        )
+    return value
+
+
+def to_metres(latitude: float, longitude: float, meridian: float) -> tuple[float, float]:
+    """Return (east, north) of a place in degrees: metres from the equator and a middle meridian (degrees)."""
+    away = radians(longitude - meridian)
+    tau = _conformal(tan(radians(latitude)))
+    xi, eta = atan2(tau, cos(away)), asinh(sin(away) / hypot(tau, cos(away)))
+    north, east = xi, eta
+    for k, a in enumerate(_THERE, start=1):
+        north += a * sin(2 * k * xi) * cosh(2 * k * eta)
+        east += a * cos(2 * k * xi) * sinh(2 * k * eta)
+    return SHRUNK * _A * east, SHRUNK * _A * north
+
+
+def to_degrees(east: float, north: float, meridian: float) -> tuple[float, float]:
+    """Return latitude and longitude of what `to_metres` maps to (east, north)."""
+    xi, eta = north / (SHRUNK * _A), east / (SHRUNK * _A)
+    inner_xi, inner_eta = xi, eta
+    for k, b in enumerate(_BACK, start=1):
+        inner_xi -= b * sin(2 * k * xi) * cosh(2 * k * eta)
+        inner_eta -= b * cos(2 * k * xi) * sinh(2 * k * eta)
+    wanted = sin(inner_xi) / hypot(sinh(inner_eta), cos(inner_xi))
+    tau = wanted
+    for _ in range(6):
+        tau -= (_conformal(tau) - wanted) * _slope(tau)
+    return degrees(atan(tau)), meridian + degrees(atan2(sinh(inner_eta), cos(inner_xi)))
+
+
+def middle_meridian(longitude: float) -> float:
+    """Return the middle meridian of the zone of UTM in which a longitude lies, degrees."""
+    return 6.0 * ((longitude + 180.0) // 6.0) - 177.0
+
+
+def _conformal(tau: float) -> float:
+    """Return the tangent of the conformal latitude from that of the latitude."""
+    sigma = sinh(_E * atanh(_E * tau / hypot(1.0, tau)))
+    return tau * hypot(1.0, sigma) - sigma * hypot(1.0, tau)
+
+
+def _slope(tau: float) -> float:
+    """Return about how fast the latitude's tangent grows with the conformal latitude's."""
+    return (1.0 + (1.0 - _E * _E) * tau * tau) / (
+        (1.0 - _E * _E) * hypot(1.0, tau) * hypot(1.0, _conformal(tau))
+    )

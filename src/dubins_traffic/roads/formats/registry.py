@@ -18,12 +18,12 @@ from dubins_traffic import outside
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.files import GZIP
 from dubins_traffic.outside import Seam
-from dubins_traffic.roads.formats.rnd_text import may_be
+from dubins_traffic.roads.formats.rnd import may_be
 from dubins_traffic.roads.formats.xml_text import is_xml, root_name
 
 BUILT_IN = {
-    "rnd-json": ("dubins_traffic.roads.formats.rnd_json", "RndJson"),
-    "rnd-text": ("dubins_traffic.roads.formats.rnd_text", "RndText"),
+    "rnd-json": ("dubins_traffic.roads.formats.rnd", "RndJson"),
+    "rnd-text": ("dubins_traffic.roads.formats.rnd", "RndText"),
     "commonroad": ("dubins_traffic.roads.formats.commonroad", "CommonRoad"),
     "lanelet2": ("dubins_traffic.roads.formats.lanelet2", "Lanelet2"),
     "osm": ("dubins_traffic.roads.formats.osm", "OpenStreetMap"),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from heapq import heappop, heappush
 
+from dubins_traffic.roads.maps.junctions import Union
 from dubins_traffic.roads.maps.model import Road
-from dubins_traffic.roads.maps.union import Union
 
 TWO_WAY, ONE_WAY, CLOSED = 1.0, 2.0, 4.0
 """What a metre of a road costs that joins others, by its kind."""

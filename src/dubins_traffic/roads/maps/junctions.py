@@ -1,20 +1,44 @@
-"""Where roads end together: ends that belong together are one junction, and its place follows from their directions."""
+"""Where ends of roads meet in a junction, and which two directions are one road, which many formats give as two."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from typing import NamedTuple
+from collections.abc import Hashable, Iterable, Mapping
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.roads.maps.model import Junction
-from dubins_traffic.roads.maps.union import Union
+from dubins_traffic.roads.maps.model import Corner, Junction, Road
+from dubins_traffic.roads.maps.polylines import along, at
 
+Member = TypeVar("Member", bound=Hashable)
 SAME = 1e-6
 """Ends nearer than this are one point."""
 PARALLEL = 0.02
 """Least eigenvalue, for each end, of the lines through them: below it they hardly cross."""
+APART = 1.0
+"""Most metres between the lines of two directions that are one road."""
+_SAMPLES = 33
+
+
+class Union(Generic[Member]):
+    """Groups of members: at first each is alone; of each group one stands for all."""
+
+    def __init__(self) -> None:
+        self._parent: dict[Member, Member] = {}
+
+    def root(self, member: Member) -> Member:
+        """Return the member that stands for all that belong together with one."""
+        while self._parent.setdefault(member, member) != member:
+            self._parent[member] = self._parent[self._parent[member]]
+            member = self._parent[member]
+        return member
+
+    def join(self, members: Iterable[Member]) -> None:
+        """Let members, and all that belong to them, belong together."""
+        roots = [self.root(member) for member in members]
+        for root in roots[1:]:
+            self._parent[self.root(root)] = self.root(roots[0])
 
 
 class End(NamedTuple):
@@ -78,3 +102,51 @@ def _place(lines: list[Floats]) -> tuple[float, float]:
         if float(np.sqrt(((crossing - mean) ** 2).sum())) <= 2.0 * reach:
             return float(crossing[0]), float(crossing[1])
     return float(mean[0]), float(mean[1])
+
+
+class OneWay(NamedTuple):
+    """One direction of a road: its line runs between the two directions, from `first` to `last`."""
+
+    name: str
+    first: str
+    last: str
+    line: Floats
+    lanes: int
+    lane_width: float
+    corners: tuple[Corner, ...] | None = None
+    closed: bool = False
+
+
+def paired(directions: list[OneWay]) -> list[Road]:
+    """Return the roads of directions; of several that could be the other way of one the nearest is."""
+    waiting: dict[tuple[str, str], list[OneWay]] = {}
+    roads: list[Road] = []
+    for one in directions:
+        back = waiting.get((one.last, one.first), [])
+        gaps = [_gap(one.line, other.line[::-1]) for other in back]
+        if gaps and min(gaps) <= APART:
+            roads.append(_joined(back.pop(gaps.index(min(gaps))), one))
+        else:
+            waiting.setdefault((one.first, one.last), []).append(one)
+    lonely = [one for group in waiting.values() for one in group]
+    return roads + [
+        Road(one.name, one.first, one.last, one.line, one.lanes, 0, one.lane_width, one.corners, one.closed)
+        for one in lonely
+    ]
+
+
+def _joined(one: OneWay, back: OneWay) -> Road:
+    width = max(one.lane_width, back.lane_width)
+    closed = one.closed or back.closed
+    return Road(one.name, one.first, one.last, one.line, one.lanes, back.lanes, width, one.corners, closed)
+
+
+def _gap(one: Floats, other: Floats) -> float:
+    """Return the largest distance of two lines at equal shares of their lengths."""
+    step = _spread(one) - _spread(other)
+    return float(np.sqrt((step * step).sum(axis=1)).max())
+
+
+def _spread(line: Floats) -> Floats:
+    """Return points at equal shares of a line's length."""
+    return at(line, np.linspace(0.0, float(along(line)[-1]), _SAMPLES))

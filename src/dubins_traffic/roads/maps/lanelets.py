@@ -8,10 +8,9 @@ from typing import NamedTuple
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.roads.maps.junctions import End, joined_where_equal, junctions_of
+from dubins_traffic.roads.maps.junctions import End, Union, joined_where_equal, junctions_of
 from dubins_traffic.roads.maps.model import Road, RoadMap
 from dubins_traffic.roads.maps.polylines import along, at, cleaned, dense, to_segments
-from dubins_traffic.roads.maps.union import Union
 
 LONGEST_LINK = 60.0
 """A lanelet between two others that is longer than this is a road, not a way through a junction, metres."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,8 +15,23 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.model import Road
 from dubins_traffic.roads.maps.polylines import dense, to_segments
-from dubins_traffic.roads.maps.reasons import Reason
 from dubins_traffic.roads.maps.settings import W
+
+
+class Reason(StrEnum):
+    """Reasons, as reports name them."""
+
+    CLOSED = "not for cars"
+    ONE_WAY = "one-way"
+    LANES = "more lanes than one in a direction"
+    WIDTH = "lanes of another width"
+    DEGREE = "more than four roads at a junction"
+    JUNCTIONS = "junctions too near each other"
+    ANGLE = "roads too near each other at a junction"
+    CURVATURE = "bends too sharply, or too near a junction"
+    LENGTH = "too short"
+    CROSSING = "crosses another road, or lies too near it"
+    APART = "not joined to the rest"
 
 
 class Outcome(NamedTuple):

@@ -12,10 +12,9 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.roads.maps.choosing import Chooser
 from dubins_traffic.roads.maps.drafting import Draft, Drafter
 from dubins_traffic.roads.maps.fitting import line_of
-from dubins_traffic.roads.maps.losses import Losses, NothingHeldError, Outcome, losses
+from dubins_traffic.roads.maps.from_rnd import network_document
+from dubins_traffic.roads.maps.losses import Losses, NothingHeldError, Outcome, Reason, losses
 from dubins_traffic.roads.maps.model import Road, RoadMap
-from dubins_traffic.roads.maps.ours import network_document
-from dubins_traffic.roads.maps.reasons import Reason
 from dubins_traffic.roads.maps.settings import ImportSettings
 
 MOST_WORK = 300

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Final
 
-from dubins_traffic.cars.partners import PARTED
+from dubins_traffic.cars.motion import PARTED
 from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.touching import Bodies
 from dubins_traffic.kernels.arrays import Floats

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
+from dubins_traffic.cars.clip_and_move import clip, rows
 from dubins_traffic.cars.dynamics import require_dubins
-from dubins_traffic.cars.rows import clip, rows
 from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.errors import InputError, PeerError

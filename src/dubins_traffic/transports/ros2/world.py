@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.cars.state import State
 from dubins_traffic.observations.senses import Senses
-from dubins_traffic.problem.senses import Laser
+from dubins_traffic.problem.parts import Laser
 from dubins_traffic.protocols import View
 from dubins_traffic.rules.labels import Caption
 from dubins_traffic.transports.quaternion import half
