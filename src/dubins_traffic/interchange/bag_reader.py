@@ -24,7 +24,7 @@ from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import End, Ending, Sink
 from dubins_traffic.record.writer import RecordWriter, record_paths
 from dubins_traffic.rules.labeller import Labeller
-from dubins_traffic.transports.quaternion import heading
+from dubins_traffic.transports.ros import heading
 from dubins_traffic.transports.ros1.transport import COMMANDS
 from dubins_traffic.trial.buffer import FrameBuffer
 

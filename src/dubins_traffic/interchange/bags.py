@@ -25,7 +25,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.trial_data import TrialData
 from dubins_traffic.record.reader import Record
 from dubins_traffic.rules.labels import words
-from dubins_traffic.transports.quaternion import half
+from dubins_traffic.transports.ros import half
 from dubins_traffic.transports.ros1.messages import definitions
 from dubins_traffic.transports.ros1.transport import COMMANDS
 

@@ -1,7 +1,7 @@
 """The task in the languages of other tools, as text.
 
 All take a `Specification`: the assumptions about the environment imply the guarantees of the system. Past operators
-become memory that the environment keeps (`translation.Memory`) where the tool has none: inputs whose first value and
+become memory that the environment keeps (`rewrite.Memory`) where the tool has none: inputs whose first value and
 every step the assumptions fix. Bounds become ticks of the given period except in STL and LaTeX.
 """
 
@@ -14,28 +14,31 @@ from typing import Final
 from dubins_traffic.logic.formula import (
     FUTURE,
     PAST,
+    SPIN,
     Bounds,
     Brackets,
     Formula,
     FormulaError,
     Op,
     Style,
+    always,
     conj,
     implies,
     make,
     number,
     propositions,
     subformulas,
+    ticks,
     written,
+    written_implication,
+    written_together,
 )
 from dubins_traffic.logic.gr1 import gr1, slugs_text, tulip_text
-from dubins_traffic.logic.printer import SPIN, written_implication, written_together
-from dubins_traffic.logic.rewrite import mapped
-from dubins_traffic.logic.temporal import always, ticks
-from dubins_traffic.logic.translation import (
+from dubins_traffic.logic.rewrite import (
     MAX_NEXT,
     for_signals,
     in_ticks,
+    mapped,
     until_and_release_only,
     without_past,
     written_out,

@@ -33,15 +33,15 @@ from dubins_traffic.logic.formula import (
     iff,
     implies,
     negation,
+    next_,
     prop,
     propositions,
     subformulas,
+    ticks,
     written,
 )
 from dubins_traffic.logic.monitor import parts
-from dubins_traffic.logic.rewrite import mapped, nnf, renamed, simplify
-from dubins_traffic.logic.temporal import next_, ticks
-from dubins_traffic.logic.translation import FreshNames, without_past
+from dubins_traffic.logic.rewrite import FreshNames, mapped, nnf, renamed, simplify, without_past
 
 
 @dataclass(frozen=True)

@@ -39,10 +39,10 @@ from dubins_traffic.logic.formula import (
     Op,
     conj,
     disj,
+    interval,
     make,
     prop,
 )
-from dubins_traffic.logic.temporal import interval
 
 T = TypeVar("T")
 

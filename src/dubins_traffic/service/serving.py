@@ -19,7 +19,7 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.service import accounts, organising
-from dubins_traffic.service.connection import TOKEN
+from dubins_traffic.service.client import TOKEN
 from dubins_traffic.service.housekeeping import Housekeeper
 from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.tables import Account, Code, Token

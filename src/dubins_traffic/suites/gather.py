@@ -15,7 +15,7 @@ from typing import Any
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, write_text
 from dubins_traffic.problem.files import parse_json
-from dubins_traffic.suites.cases import case_instances
+from dubins_traffic.suites.running import case_instances
 from dubins_traffic.suites.suite import Suite
 
 

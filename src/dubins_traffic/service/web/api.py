@@ -1,22 +1,23 @@
-"""The API of participants: what the pages show, as JSON, by a token."""
+"""The API of participants: what the pages show, as JSON, by a token; and numbers for Prometheus."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from litestar import Controller, Response, get, post
+from litestar import Controller, MediaType, Response, get, post
 from litestar.datastructures import UploadFile
+from litestar.exceptions import NotAuthorizedException
 from litestar.params import MultipartBody, PathParameter
-from sqlalchemy import select
+from prometheus_client import CollectorRegistry, Gauge, generate_latest
+from sqlalchemy import func, select
 
 from dubins_traffic.service import receiving, standings, viewing
 from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.tables import Competition
-from dubins_traffic.service.web import bodies
-from dubins_traffic.service.web import viewer as who
-from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
+from dubins_traffic.service.tables import Competition, Submission
+from dubins_traffic.service.web import requests
+from dubins_traffic.service.web.requests import OfficeHere, Viewer, ViewerHere
 
 Name = Annotated[str, PathParameter(pattern="^[a-z0-9-]{1,60}$")]
 Number = Annotated[int, PathParameter(ge=1, le=2**31 - 1)]
@@ -73,7 +74,7 @@ class Api(Controller):
                 return [] if latest is None else list(latest.places)
             return standings.shown_table(office.phase(row), latest)
 
-    @get("/account", sync_to_thread=True, guards=[who.person])
+    @get("/account", sync_to_thread=True, guards=[requests.person])
     def account(self, viewer: ViewerHere) -> dict[str, Any]:
         """Return whose token this is."""
         return {
@@ -82,7 +83,11 @@ class Api(Controller):
             "team": viewer.team and viewer.team.name,
         }
 
-    @get("/competitions/{slug:str}/phases/{name:str}/submissions", sync_to_thread=True, guards=[who.person])
+    @get(
+        "/competitions/{slug:str}/phases/{name:str}/submissions",
+        sync_to_thread=True,
+        guards=[requests.person],
+    )
     def submissions(
         self, office: OfficeHere, viewer: ViewerHere, slug: Name, name: Name
     ) -> list[dict[str, Any]]:
@@ -98,8 +103,8 @@ class Api(Controller):
     @post(
         "/competitions/{slug:str}/phases/{name:str}/submissions",
         sync_to_thread=True,
-        guards=[who.person],
-        opt={bodies.FILES: True},
+        guards=[requests.person],
+        opt={requests.FILES: True},
     )
     def submit(
         self,
@@ -114,24 +119,24 @@ class Api(Controller):
         number, new = receiving.take_in(office, viewer.person, slug, name, data.file.filename, sent)
         return Response(_view(office, viewer, number), status_code=201 if new else 200)
 
-    @get("/submissions/{number:int}", sync_to_thread=True, guards=[who.person])
+    @get("/submissions/{number:int}", sync_to_thread=True, guards=[requests.person])
     def submission(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Return what may be seen of a submission."""
         return _view(office, viewer, number)
 
-    @post("/submissions/{number:int}/cancel", sync_to_thread=True, guards=[who.person], status_code=200)
+    @post("/submissions/{number:int}/cancel", sync_to_thread=True, guards=[requests.person], status_code=200)
     def cancel(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Cancel a submission."""
         receiving.cancel(office, viewer.person, number)
         return _view(office, viewer, number)
 
-    @post("/submissions/{number:int}/name", sync_to_thread=True, guards=[who.person], status_code=200)
+    @post("/submissions/{number:int}/name", sync_to_thread=True, guards=[requests.person], status_code=200)
     def name(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Let a submission be the one of its team that counts."""
         receiving.name_it(office, viewer.person, number)
         return _view(office, viewer, number)
 
-    @get("/submissions/{number:int}/logs", sync_to_thread=True, guards=[who.person])
+    @get("/submissions/{number:int}/logs", sync_to_thread=True, guards=[requests.person])
     def logs(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Return the logs of a submission that may be seen: of all trials, or the tail of one."""
         told = _view(office, viewer, number)
@@ -151,3 +156,22 @@ def _view(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
     with office.database.reading() as session:
         found = receiving.found_submission(session, number, viewer.account)
         return viewing.told_submission(office, session, found, viewer.account, viewing.places_of(session))
+
+
+@get("/metrics", sync_to_thread=True, include_in_schema=False)
+def metrics(office: OfficeHere, viewer: ViewerHere) -> Response[bytes]:
+    """Return the numbers in Prometheus' text format."""
+    if not (viewer.organiser or viewer.worker):
+        raise NotAuthorizedException("numbers are for organisers")
+    registry = CollectorRegistry()
+    with office.database.reading() as session:
+        status = viewing.told_status(office, session)
+        states = session.execute(select(Submission.state, func.count()).group_by(Submission.state)).all()
+    for name in ("waiting", "running", "workers"):
+        Gauge(f"dubins_traffic_{name}", f"{name}, see the page of the queue", registry=registry).set(
+            status[name]
+        )
+    gauge = Gauge("dubins_traffic_submissions", "submissions by state", ["state"], registry=registry)
+    for state, count in states:
+        gauge.labels(state).set(count)
+    return Response(generate_latest(registry), media_type=MediaType.TEXT)

@@ -11,15 +11,14 @@ from litestar.params import FromPath, MultipartBody, URLEncodedBody
 from litestar.response import Redirect, Template
 from sqlalchemy import select
 
-from dubins_traffic.service import accounts, exporting, organising, receiving, viewing
+from dubins_traffic.service import accounts, organising, receiving, viewing
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.tables import Account, Act, Competition, Submission, Team
-from dubins_traffic.service.web import bodies
-from dubins_traffic.service.web import viewer as who
-from dubins_traffic.service.web.said import Form, page
-from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
+from dubins_traffic.service.web import requests
+from dubins_traffic.service.web.pages import Form, page
+from dubins_traffic.service.web.requests import OfficeHere, Viewer, ViewerHere
 
 Given = URLEncodedBody[Form]
 
@@ -37,14 +36,14 @@ class Organisers(Controller):
 
     path = "/desk"
     include_in_schema = False
-    guards = [who.organiser]  # noqa: RUF012
+    guards = [requests.organiser]  # noqa: RUF012
 
     @get("/", sync_to_thread=True)
     def desk(self, office: OfficeHere, viewer: ViewerHere) -> Template:
         """Show the desk."""
         return _shown(office, viewer)
 
-    @post("/create", sync_to_thread=True, opt={bodies.FILES: True})
+    @post("/create", sync_to_thread=True, opt={requests.FILES: True})
     def create(
         self,
         office: OfficeHere,
@@ -147,7 +146,7 @@ class Organisers(Controller):
             row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
             if row is None:
                 raise UnknownError("no such competition")
-            data = exporting.export(office, session, row)
+            data = organising.export(office, session, row)
         headers = {"content-disposition": f'attachment; filename="{slug}.zip"'}
         return Response(data, media_type="application/zip", headers=headers)
 

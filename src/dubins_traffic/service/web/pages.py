@@ -1,23 +1,46 @@
-"""Pages that everybody may open: competitions, phases, tables, the state of the queue, replays."""
+"""Pages: those that everybody may open, those of a team about itself and its submissions, and those to log in."""
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
 
-from litestar import Controller, MediaType, Response, get
+from litestar import Controller, MediaType, Request, Response, get, post
+from litestar.datastructures import UploadFile
 from litestar.exceptions import NotFoundException
-from litestar.params import FromPath
-from litestar.response import Template
+from litestar.params import FromPath, FromQuery, MultipartBody, URLEncodedBody
+from litestar.response import Redirect, Template
 from sqlalchemy import select
+from sqlalchemy.orm import Session
 
 from dubins_traffic.competition import sealing
-from dubins_traffic.service import receiving, standings, submissions, viewing
+from dubins_traffic.service import accounts, receiving, standings, submissions, viewing
+from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.tables import Competition, Standing, Submission, Trial
-from dubins_traffic.service.web.said import page
-from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
+from dubins_traffic.service.submissions import RefusedError
+from dubins_traffic.service.tables import Account, Competition, Standing, Submission, Team, Token, Trial
+from dubins_traffic.service.web import requests
+from dubins_traffic.service.web.requests import OfficeHere, Viewer, ViewerHere
+
+Form = dict[str, str]
+TEMPLATES = "service/web/templates"
+
+
+def page(office: Office, viewer: Viewer, template: str, title: str, /, **given: Any) -> Template:
+    """Return a page by its template."""
+    context = {"viewer": viewer, "site": office.settings.name, "title": title, "now": office.clock(), **given}
+    return Template(f"{TEMPLATES}/{template}.html", context=context)
+
+
+def moment(at: float | None) -> str:
+    """Return a time as people read it, in UTC."""
+    return "" if at is None else datetime.fromtimestamp(at, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
 
 REPLAY_POLICY = (
     "sandbox allow-scripts; default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -170,3 +193,246 @@ def _seen(
     if found is None:
         raise UnknownError("no such trial")
     return submission, found
+
+
+@dataclass
+class Sent:
+    """The form with a submission."""
+
+    file: UploadFile
+
+
+class Submitting(Controller):
+    """What a team does with its submissions."""
+
+    include_in_schema = False
+    guards = [requests.person]  # noqa: RUF012
+
+    @post("/c/{slug:str}/{name:str}/submit", sync_to_thread=True, opt={requests.FILES: True})
+    def submit(
+        self,
+        office: OfficeHere,
+        viewer: ViewerHere,
+        slug: FromPath[str],
+        name: FromPath[str],
+        data: MultipartBody[Sent],
+    ) -> Redirect:
+        """Take in a submission."""
+        sent = data.file.file.read()
+        number, _ = receiving.take_in(office, viewer.person, slug, name, data.file.filename, sent)
+        return Redirect(f"/s/{number}", status_code=303)
+
+    @get("/s/{number:int}", sync_to_thread=True)
+    def submission(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
+        """Show a submission."""
+        return page(office, viewer, "submission", f"Submission {number}", **_view(office, viewer, number))
+
+    @get("/s/{number:int}/live", sync_to_thread=True)
+    def live(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
+        """Return the part of the page of a submission that changes."""
+        return page(office, viewer, "live", "", **_view(office, viewer, number))
+
+    @post("/s/{number:int}/cancel", sync_to_thread=True)
+    def cancel(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Cancel a submission."""
+        receiving.cancel(office, viewer.person, number)
+        return Redirect(f"/s/{number}", status_code=303)
+
+    @post("/s/{number:int}/name", sync_to_thread=True)
+    def name(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Let a submission be the one that counts."""
+        receiving.name_it(office, viewer.person, number)
+        return Redirect(f"/s/{number}", status_code=303)
+
+
+def _view(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
+    with office.database.reading() as session:
+        found = receiving.found_submission(session, number, viewer.account)
+        places = viewing.places_of(session)
+        told = viewing.told_submission(office, session, found, viewer.account, places, logs=False)
+        differing = viewing.differing(office, session, found) if "trials" in told else []
+        closed = found.phase.is_closed(office.clock())
+    return {"submission": told, "differing": differing, "closed": closed}
+
+
+Given = URLEncodedBody[Form]
+
+
+class Teams(Controller):
+    """What a person does with the own team and account."""
+
+    path = "/team"
+    include_in_schema = False
+    guards = [requests.person]  # noqa: RUF012
+
+    @get("/", sync_to_thread=True)
+    def team(self, office: OfficeHere, viewer: ViewerHere) -> Template:
+        """Show the team, and the own account."""
+        return _shown(office, viewer)
+
+    @post("/found", sync_to_thread=True)
+    def found(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Redirect:
+        """Found a team."""
+        with office.database.writing() as session:
+            account = session.get_one(Account, viewer.person.id)
+            if account.team_id is not None:
+                raise RefusedError("you are in a team already")
+            account.team_id = accounts.found_team(session, data.get("name", ""), office.clock()).id
+        return Redirect("/team", status_code=303)
+
+    @post("/invite", sync_to_thread=True, status_code=200)
+    def invite(self, office: OfficeHere, viewer: ViewerHere) -> Template:
+        """Show a new code by which one person can join the team."""
+        if viewer.team is None:
+            raise RefusedError("you are in no team")
+        with office.database.writing() as session:
+            team = session.get_one(Team, viewer.team.id)
+            code = accounts.invite(session, accounts.PARTICIPANT, team, office.clock())
+        return _shown(office, viewer, code=code)
+
+    @post("/tokens", sync_to_thread=True, status_code=200)
+    def token(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Template:
+        """Show a new token of the API, this once."""
+        with office.database.writing() as session:
+            account = session.get_one(Account, viewer.person.id)
+            token = accounts.new_token(session, data.get("name", ""), account, office.clock())
+        return _shown(office, viewer, token=token)
+
+    @post("/tokens/{number:int}/revoke", sync_to_thread=True)
+    def revoke(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Revoke a token."""
+        with office.database.writing() as session:
+            token = session.get(Token, number) if number < 1 << 31 else None
+            if token is None or token.account_id != viewer.person.id:
+                raise WrongEntryError("no such token")
+            token.revoked = office.clock()
+        return Redirect("/team", status_code=303)
+
+    @post("/password", sync_to_thread=True)
+    def password(
+        self, request: Request[Any, Any, Any], office: OfficeHere, viewer: ViewerHere, data: Given
+    ) -> Redirect:
+        """Set another password."""
+        with office.database.writing() as session:
+            account = _sure(session, viewer, data)
+            accounts.set_password(session, account, data.get("new", ""), office.clock())
+            keep(request, account)
+        return Redirect("/team", status_code=303)
+
+    @post("/remove", sync_to_thread=True)
+    def remove(
+        self, request: Request[Any, Any, Any], office: OfficeHere, viewer: ViewerHere, data: Given
+    ) -> Redirect:
+        """Remove the own account."""
+        with office.database.writing() as session:
+            account = _sure(session, viewer, data)
+            accounts.remove(session, account, office.clock())
+            accounts.note(
+                session, None, "remove account", f"account {account.id}", "by its owner", office.clock()
+            )
+        request.clear_session()
+        return Redirect("/", status_code=303)
+
+
+def _sure(session: Session, viewer: Viewer, data: Form) -> Account:
+    """Return the own account, if the password given is its."""
+    account = accounts.verified(session, viewer.person.name, data.get("password", ""))
+    if account is None:
+        raise WrongEntryError("password: not that of this account")
+    return account
+
+
+def _shown(office: Office, viewer: Viewer, code: str = "", token: str = "") -> Template:
+    with office.database.reading() as session:
+        team = session.get(Team, viewer.person.team_id) if viewer.person.team_id else None
+        members = [own.name for own in team.accounts] if team else []
+        tokens = accounts.tokens(session, viewer.person)
+    given = {"team": team, "members": members, "tokens": tokens, "code": code, "token": token}
+    return page(office, viewer, "team", "Team and account", url=office.settings.url, **given)
+
+
+Asked = Request[Any, Any, Any]
+
+
+class Login(Controller):
+    """The door of people."""
+
+    include_in_schema = False
+
+    @get("/login", sync_to_thread=True)
+    def login_page(self, office: OfficeHere, viewer: ViewerHere) -> Template:
+        """Show the form to log in."""
+        return page(office, viewer, "login", "Log in", wrong="", name="")
+
+    @post("/login", sync_to_thread=True, status_code=200)
+    def login(
+        self, request: Asked, office: OfficeHere, viewer: ViewerHere, data: Given
+    ) -> Template | Redirect:
+        """Log in."""
+        with office.database.reading() as session:
+            account = accounts.verified(session, data.get("name", ""), data.get("password", ""))
+        if account is None:
+            wrong = "No account has this name and password."
+            return page(office, viewer, "login", "Log in", wrong=wrong, name=data.get("name", ""))
+        return _enter(request, account)
+
+    @post("/logout", sync_to_thread=False)
+    def logout(self, request: Asked) -> Redirect:
+        """Log out."""
+        request.clear_session()
+        return Redirect("/")
+
+    @get("/join", sync_to_thread=True)
+    def join_page(self, office: OfficeHere, viewer: ViewerHere, code: FromQuery[str] = "") -> Template:
+        """Show the form to make an account."""
+        return page(office, viewer, "join", "Join", wrong="", given={"code": code})
+
+    @post("/join", sync_to_thread=True, status_code=200)
+    def join(
+        self, request: Asked, office: OfficeHere, viewer: ViewerHere, data: Given
+    ) -> Template | Redirect:
+        """Make an account by an invitation, and log in."""
+        try:
+            with office.database.writing() as session:
+                account = accounts.register(
+                    session,
+                    data.get("code", ""),
+                    data.get("name", ""),
+                    data.get("password", ""),
+                    data.get("team", ""),
+                    office.clock(),
+                )
+        except WrongEntryError as error:
+            return page(office, viewer, "join", "Join", wrong=str(error), given={**data, "password": ""})
+        return _enter(request, account)
+
+    @get("/reset", sync_to_thread=True)
+    def reset_page(self, office: OfficeHere, viewer: ViewerHere, code: FromQuery[str] = "") -> Template:
+        """Show the form for a new password."""
+        return page(office, viewer, "reset", "New password", wrong="", code=code)
+
+    @post("/reset", sync_to_thread=True, status_code=200)
+    def reset(
+        self, request: Asked, office: OfficeHere, viewer: ViewerHere, data: Given
+    ) -> Template | Redirect:
+        """Set a new password by a code, and log in."""
+        try:
+            with office.database.writing() as session:
+                account = accounts.reset(
+                    session, data.get("code", ""), data.get("password", ""), office.clock()
+                )
+        except WrongEntryError as error:
+            return page(office, viewer, "reset", "New password", wrong=str(error), code=data.get("code", ""))
+        return _enter(request, account)
+
+
+def keep(request: Asked, account: Account) -> None:
+    """Begin a session: whose it is, the number of the password with which it was begun, and what no other has."""
+    session: Any = {"account": account.id, "epoch": account.epoch, "begun": secrets.token_hex(16)}
+    request.set_session(session)  # pyright: ignore[reportUnknownMemberType]
+
+
+def _enter(request: Asked, account: Account) -> Redirect:
+    """Begin a session, and lead on."""
+    keep(request, account)
+    return Redirect("/", status_code=303)

@@ -19,8 +19,8 @@ from dubins_traffic.service import housekeeping, queue, submissions
 from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.office import Office
 from dubins_traffic.service.tables import Chunk, Submission, Worker
-from dubins_traffic.service.web import bodies, viewer
-from dubins_traffic.service.web.viewer import OfficeHere
+from dubins_traffic.service.web import requests
+from dubins_traffic.service.web.requests import OfficeHere
 
 Digest = Annotated[str, PathParameter(pattern="^[0-9a-f]{64}$", examples=[Example(value="0" * 64)])]
 Text = Annotated[str, msgspec.Meta(max_length=60)]
@@ -92,7 +92,7 @@ class Doors(Controller):
     """What workers ask."""
 
     path = "/worker"
-    guards = [viewer.worker]  # noqa: RUF012
+    guards = [requests.worker]  # noqa: RUF012
     tags = ["workers"]  # noqa: RUF012
     include_in_schema = True
 
@@ -126,7 +126,7 @@ class Doors(Controller):
 
         office.database.patiently(renew)
 
-    @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK, opt={bodies.FILES: True})
+    @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK, opt={requests.FILES: True})
     async def replay(
         self,
         office: OfficeHere,
@@ -146,7 +146,7 @@ class Doors(Controller):
         "/chunks/{number:int}/done",
         sync_to_thread=True,
         status_code=HTTP_204_NO_CONTENT,
-        opt={bodies.FILES: True},
+        opt={requests.FILES: True},
     )
     def done(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Report]) -> None:
         """End a lease with its results; they and what follows from them are kept together, or not at all."""
