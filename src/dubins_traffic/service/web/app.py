@@ -34,9 +34,9 @@ from sqlalchemy.exc import DBAPIError
 
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service.accounts import WrongEntryError
-from dubins_traffic.service.office import Office, Settings
 from dubins_traffic.service.queue import StaleLeaseError
 from dubins_traffic.service.receiving import UnknownError
+from dubins_traffic.service.service import Service, Settings
 from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import api, organisers, pages, worker_api
@@ -119,25 +119,25 @@ STATUS = {
 }
 
 
-def create_app(office: Office) -> Litestar:
+def create_app(service: Service) -> Litestar:
     """Return the application of a service."""
-    settings = office.settings
+    settings = service.settings
     largest = (max(settings.largest_upload, settings.largest_replay) << 20) + (1 << 20)
 
-    async def give_office() -> Office:
-        return office
+    async def give_service() -> Service:
+        return service
 
     handlers = (pages.Pages, pages.Submitting, pages.Login, pages.Teams, organisers.Organisers, api.Api)
     files = create_static_files_router(
         "/static", [Path(__file__).with_name("static")], include_in_schema=False
     )
-    kept = SessionFiles(office.folder / "sessions", create_directories=True)
+    kept = SessionFiles(service.folder / "sessions", create_directories=True)
     return Litestar(
-        route_handlers=[*handlers, worker_api.Doors, api.metrics, files],
-        dependencies={"office": Provide(give_office), "viewer": Provide(_viewer)},
+        route_handlers=[*handlers, worker_api.WorkerApi, api.metrics, files],
+        dependencies={"service": Provide(give_service), "viewer": Provide(_viewer)},
         middleware=_middleware(settings, largest),
         csrf_config=CSRFConfig(
-            office.cookie_secret,
+            service.cookie_secret,
             cookie_name=f"{_prefix(settings)}csrf",
             cookie_secure=settings.secure,
             cookie_httponly=True,
@@ -151,7 +151,7 @@ def create_app(office: Office) -> Litestar:
         request_max_body_size=largest,
         logging_config=None,
         openapi_config=_described(settings.name),
-        state=_state(office),
+        state=_state(service),
     )
 
 
@@ -182,10 +182,10 @@ def _templates() -> JinjaTemplateEngine:
     return JinjaTemplateEngine.from_environment(made)
 
 
-def _state(office: Office) -> Any:
+def _state(service: Service) -> Any:
     from litestar.datastructures import State
 
-    return State({"office": office})
+    return State({"service": service})
 
 
 async def _viewer(request: Request[Any, Any, Any]) -> Viewer:
@@ -236,12 +236,12 @@ def _answer_to(request: Request[Any, Any, Any], error: Exception) -> Response[An
     if status == 401 and request.method == "GET":
         return Redirect("/login", headers=HEADERS)
     viewer = request.scope["user"] if "user" in request.scope else Viewer()
-    office: Office = request.app.state["office"]
+    service: Service = request.app.state["service"]
     return Template(
         f"{TEMPLATES}/error.html",
         context={
             "viewer": viewer,
-            "site": office.settings.name,
+            "site": service.settings.name,
             "status": status,
             "detail": detail,
             "title": f"Error {status}",

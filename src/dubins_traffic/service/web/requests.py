@@ -16,11 +16,11 @@ from litestar.types import ASGIApp, HTTPReceiveMessage, Receive, Scope, Send
 from litestar.types.asgi_types import WebSocketReceiveMessage
 
 from dubins_traffic.service import accounts
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.tables import Account, Team
 
-OfficeHere = NamedDependency[Office]
-"""The office, as handlers are given it."""
+ServiceHere = NamedDependency[Service]
+"""The service, as handlers are given it."""
 Asked = ASGIConnection[Any, Any, Any, Any]
 BEARER = "bearer "
 PROGRAMS = ("/api/", "/worker/", "/metrics")
@@ -57,21 +57,21 @@ class Recognition(AbstractAuthenticationMiddleware):
 
     async def authenticate_request(self, connection: Asked) -> AuthenticationResult:
         """Return the viewer."""
-        office: Office = connection.app.state["office"]
+        service: Service = connection.app.state["service"]
         if connection.url.path.startswith(PROGRAMS):
             given = connection.headers.get("authorization", "")
             token = given[len(BEARER) :].strip() if given.lower().startswith(BEARER) else ""
-            viewer = await anyio.to_thread.run_sync(_by_token, office, token) if token else Viewer()
+            viewer = await anyio.to_thread.run_sync(_by_token, service, token) if token else Viewer()
             if token and viewer == Viewer():
                 raise NotAuthorizedException("the token is unknown or revoked")
         else:
             session = connection.session if "session" in connection.scope else {}
-            viewer = await anyio.to_thread.run_sync(_by_session, office, dict(session or {}))
+            viewer = await anyio.to_thread.run_sync(_by_session, service, dict(session or {}))
         return AuthenticationResult(user=viewer, auth=None)
 
 
-def _by_token(office: Office, token: str) -> Viewer:
-    with office.database.reading() as session:
+def _by_token(service: Service, token: str) -> Viewer:
+    with service.database.reading() as session:
         found = accounts.token_of(session, token)
         if found is None:
             return Viewer()
@@ -81,11 +81,11 @@ def _by_token(office: Office, token: str) -> Viewer:
         return Viewer(account, account.team)
 
 
-def _by_session(office: Office, data: dict[str, Any]) -> Viewer:
+def _by_session(service: Service, data: dict[str, Any]) -> Viewer:
     number = data.get("account")
     if not isinstance(number, int):
         return Viewer()
-    with office.database.reading() as session:
+    with service.database.reading() as session:
         account = session.get(Account, number)
         if account is None or account.removed is not None or account.epoch != data.get("epoch"):
             return Viewer()

@@ -102,7 +102,7 @@ def own_secret(folder: Path, name: str) -> str:
 Clock = Callable[[], float]
 
 
-class Office:
+class Service:
     """What every part of the service works with.
 
     Parameters
