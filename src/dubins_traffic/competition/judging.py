@@ -351,10 +351,7 @@ def load_evaluation(place: Path) -> Evaluation:
 
     A last line that was cut off is left out, and of a trial that ran twice the last result counts.
 
-    Raises
-    ------
-    InputError
-        If there is none, or a line is no result.
+    InputError if there is none, or a line is no result.
     """
     path = place / RESULTS if place.is_dir() else place
     text = read_text(path)

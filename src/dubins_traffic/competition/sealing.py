@@ -114,13 +114,7 @@ class Seeds:
 
 
 def read_seeds(text: str, file: str | None = None) -> Seeds:
-    """Return the seeds that a revealed text says.
-
-    Raises
-    ------
-    InputError
-        If it is no such text, to the byte.
-    """
+    """Return the seeds that a revealed text says; InputError if it is no such text, to the byte."""
     lines = text.split("\n")
     expected = f"{HEADING}, phase, rules, salt, and a seed a line"
     if len(lines) < 6 or lines[0] != HEADING or lines[-1]:
@@ -143,13 +137,7 @@ def read_seeds(text: str, file: str | None = None) -> Seeds:
 
 
 def check_belong(seeds: Seeds, phase: Seeded, file: str | None = None) -> None:
-    """Refuse seeds that are of another phase, or of one whose rules were others.
-
-    Raises
-    ------
-    InputError
-        If they are.
-    """
+    """Refuse seeds that are of another phase, or of one whose rules were others; InputError if they are."""
     if seeds.phase != phase.name:
         raise InputError(
             "seeds of another phase", file=file, field="phase", value=seeds.phase, expected=phase.name
@@ -225,10 +213,7 @@ def revealed_path(phase: Seeded) -> Path:
 def draw_seeds(phase: Seeded) -> Seeds:
     """Return new seeds for a phase, from the system's source of secrets, from which all its trials can be drawn.
 
-    Raises
-    ------
-    InputError
-        If a trial can't be drawn from any of `MOST_DRAWS` seeds.
+    InputError if a trial can't be drawn from any of `MOST_DRAWS` seeds.
     """
     seeds = tuple(_drawable(phase, number) for number in phase.numbers)
     return Seeds(phase.name, phase.rules, secrets.token_hex(32), seeds)
@@ -348,10 +333,7 @@ def publish(phase: Seeded, title: str, now: datetime | None = None) -> Published
 def reveal(phase: Seeded, key: bytes, now: datetime | None = None) -> Path:
     """Write the seeds of a phase that has closed for everybody to see; return where.
 
-    Raises
-    ------
-    InputError
-        If the phase is not over, its commitment was never published or is another, or the key is wrong.
+    InputError if the phase is not over, its commitment was never published or is another, or the key is wrong.
     """
     _check_secret(phase)
     if not phase.is_closed(now):
@@ -370,13 +352,7 @@ def reveal(phase: Seeded, key: bytes, now: datetime | None = None) -> Path:
 
 
 def check_revealed(seeds: Seeds, phase: Seeded, commitment: str) -> None:
-    """Refuse seeds that are not those of a phase that were committed to.
-
-    Raises
-    ------
-    InputError
-        If they are not.
-    """
+    """Refuse seeds that are not those of a phase that were committed to; InputError if they are not."""
     check_belong(seeds, phase)
     if seeds.commitment != commitment:
         raise InputError(
@@ -390,10 +366,7 @@ def check_revealed(seeds: Seeds, phase: Seeded, commitment: str) -> None:
 def secret_seeds(phase: Seeded, key: bytes | None) -> tuple[int, ...]:
     """Return the seeds of a phase that has secret ones: the revealed ones, else those that `key` decrypts.
 
-    Raises
-    ------
-    InputError
-        If they are still secret and the key is missing or wrong.
+    InputError if they are still secret and the key is missing or wrong.
     """
     if phase.folder is not None and is_file(revealed_path(phase)):
         path = revealed_path(phase)
@@ -505,10 +478,7 @@ def make_key_file(path: Path, folder: Path | None) -> None:
 def read_key(path: Path, folder: Path | None) -> bytes:
     """Return what is in a key file.
 
-    Raises
-    ------
-    InputError
-        If it can't be read, or lies in the folder of the competition: who copies that would have both.
+    InputError if it can't be read, or lies in the folder of the competition: who copies that would have both.
     """
     _check_outside(path, folder)
     return read_text(path).strip().encode()

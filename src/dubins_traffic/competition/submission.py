@@ -52,10 +52,7 @@ class Bounds:
 def folder_files(folder: Path, bounds: Bounds) -> dict[str, bytes]:
     """Return the files below a folder by name, with slashes; links are not followed but refused.
 
-    Raises
-    ------
-    InputError
-        If there is something that is no file or folder, can't be read, or is too much.
+    InputError if there is something that is no file or folder, can't be read, or is too much.
     """
     found: dict[str, bytes] = {}
     left = bounds.total
@@ -76,10 +73,7 @@ def folder_files(folder: Path, bounds: Bounds) -> dict[str, bytes]:
 def check_apart(folder: Path, results: Path) -> None:
     """Refuse to keep results where they would become a part of what is evaluated.
 
-    Raises
-    ------
-    InputError
-        If `results` lies in `folder` and would be read as a part of it.
+    InputError if `results` lies in `folder` and would be read as a part of it.
     """
     own, place = folder.resolve(), results.resolve()
     if folder.is_dir() and place.is_relative_to(own) and _is_kept(place.relative_to(own).as_posix()):
@@ -93,10 +87,8 @@ def check_apart(folder: Path, results: Path) -> None:
 def zip_files(data: bytes, bounds: Bounds) -> dict[str, bytes]:
     """Return the files of a zip archive by name.
 
-    Raises
-    ------
-    InputError
-        If it is damaged, encrypted, or holds anything but files and folders inside itself that are not too much.
+    InputError if it is damaged, encrypted, or holds anything but files and folders inside itself that are not too
+    much.
     """
     if data.count(_ENTRY) > 8 * bounds.files:
         raise InputError("too many entries in the archive", expected=f"at most {bounds.files} files")

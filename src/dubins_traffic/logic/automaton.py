@@ -203,10 +203,7 @@ class Emptiness:
     def meetable(self, memory: tuple[bool, ...], numbers: frozenset[int]) -> bool:
         """Say whether some infinite word meets all obligations in `numbers`.
 
-        Raises
-        ------
-        FormulaError
-            If the automaton grows too large.
+        FormulaError if the automaton grows too large.
         """
         state = memory, numbers
         if not numbers:

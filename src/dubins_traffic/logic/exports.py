@@ -152,10 +152,7 @@ _SPOT: Final = Style({Op.AND: "&", Op.OR: "|", Op.TRUE: "1", Op.FALSE: "0"}, bou
 def spot(spec: Specification, period: float) -> str:
     """Return one formula as Spot reads it; bounds in ticks, long ones in parts: ``F[0:46] F[0:254] p``.
 
-    Raises
-    ------
-    FormulaError
-        If a bound is too long for that; says which period would do.
+    FormulaError if a bound is too long for that; says which period would do.
     """
     _check_longest(spec, period, _SPOT_PARTS * int(_SPOT_COUNTS), "for Spot")
     plain = _changed(_without_past(spec), lambda formula: in_ticks(formula, period))
@@ -271,10 +268,7 @@ def _quoted(text: str) -> str:
 def slugs(spec: Specification, period: float) -> str:
     """Return a document in slugs' structured form.
 
-    Raises
-    ------
-    FormulaError
-        If a part is outside of what GR(1) can say (`gr1.gr1`).
+    FormulaError if a part is outside of what GR(1) can say (`gr1.gr1`).
     """
     return slugs_text(gr1(spec.assumptions, spec.guarantees, spec.inputs, spec.outputs, period))
 
@@ -282,10 +276,7 @@ def slugs(spec: Specification, period: float) -> str:
 def tulip(spec: Specification, period: float) -> str:
     """Return a Python file that makes TuLiP's GR(1) specification.
 
-    Raises
-    ------
-    FormulaError
-        If a part is outside of what GR(1) can say (`gr1.gr1`).
+    FormulaError if a part is outside of what GR(1) can say (`gr1.gr1`).
     """
     return tulip_text(gr1(spec.assumptions, spec.guarantees, spec.inputs, spec.outputs, period))
 

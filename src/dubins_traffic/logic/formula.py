@@ -415,13 +415,7 @@ def release(left: Formula, right: Formula, bounds: Bounds | None = None) -> Form
 
 
 def interval(bounds: Bounds | None) -> Bounds | None:
-    """Return `bounds` as floats.
-
-    Raises
-    ------
-    FormulaError
-        If they are not 0 <= a <= b <= `LONGEST_BOUND`.
-    """
+    """Return `bounds` as floats; FormulaError if they are not 0 <= a <= b <= `LONGEST_BOUND`."""
     if bounds is None:
         return None
     low, high = float(bounds[0]), float(bounds[1])

@@ -91,10 +91,8 @@ def gr1(
 ) -> GR1:
     """Return the specification in GR(1).
 
-    Raises
-    ------
-    FormulaError
-        If a part is of none of the forms above, or if an assumption restricts what the system chooses first or next.
+    FormulaError if a part is of none of the forms above, or if an assumption restricts what the system chooses first
+    or next.
     """
     changed, memories = without_past([*assumptions, *guarantees])
     environment = Side([*inputs, *(memory.name for memory in memories)])

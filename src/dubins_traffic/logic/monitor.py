@@ -148,10 +148,7 @@ TOGETHER: Final = Limits(states=256, cells=4_096, sought=1_000, choices=8_192)
 def parts(formula: Formula) -> tuple[Formula, ...]:
     """Return formulas whose conjunction is equivalent to `formula`; what has no temporal operator stays together.
 
-    Raises
-    ------
-    FormulaError
-        If there are more than `MAX_PARTS`.
+    FormulaError if there are more than `MAX_PARTS`.
     """
     split = dict.fromkeys(_split(formula, True))
     plain = [part for part in split if not any(inner.op in FUTURE | PAST for inner in subformulas(part))]

@@ -50,10 +50,7 @@ class Letter(NamedTuple):
 def timed_parts(formula: Formula) -> frozenset[Formula]:
     """Return the parts of a formula in which a temporal operator stands.
 
-    Raises
-    ------
-    FormulaError
-        If a past operator ranges over a future one.
+    FormulaError if a past operator ranges over a future one.
     """
     timed: set[Formula] = set()
     future: set[Formula] = set()
@@ -78,10 +75,7 @@ def letters_of(
 
     Bit number i of a valuation is the value of proposition number i.
 
-    Raises
-    ------
-    FormulaError
-        If there are more than `MAX_LETTERS` letters.
+    FormulaError if there are more than `MAX_LETTERS` letters.
     """
     count = 1 << len(names)
     numbers = np.arange(count)
@@ -205,10 +199,7 @@ class Table:
     def observe(self, formula: Formula) -> None:
         """Make `outcome` and `letter` ready for a formula without future operators.
 
-        Raises
-        ------
-        FormulaError
-            If there are too many propositions.
+        FormulaError if there are too many propositions.
         """
         self._prepare(formula)
         self._register(formula)

@@ -300,10 +300,7 @@ def without_past(formulas: Sequence[Formula]) -> tuple[tuple[Formula, ...], tupl
     Equal past operators share their memory. The formulas hold on an infinite word exactly if the new ones hold on
     the same word with the memory as it must be.
 
-    Raises
-    ------
-    FormulaError
-        If a past operator ranges over a future one.
+    FormulaError if a past operator ranges over a future one.
     """
     names = FreshNames(name for formula in formulas for name in propositions(formula))
     memories: dict[Formula, Memory] = {}
@@ -385,10 +382,7 @@ def in_ticks(formula: Formula, period: float) -> Formula:
 def written_out(formula: Formula) -> Formula:
     """Return a formula with bounds in ticks (`in_ticks`) written out with next.
 
-    Raises
-    ------
-    FormulaError
-        If that takes more than `MAX_NEXT` nested nexts.
+    FormulaError if that takes more than `MAX_NEXT` nested nexts.
     """
 
     def change(part: Formula) -> Formula:

@@ -155,10 +155,7 @@ class Strike:
 def strikes(layers: Layers, attacks: Sequence[Attack] = ATTACKS) -> Iterator[Strike]:
     """Run attacks on boxes with these layers, one after another, and yield what came of each.
 
-    Raises
-    ------
-    BoxOverError
-        If a box can't be made.
+    BoxOverError if a box can't be made.
     """
     with Baits() as baits:
         for attack in attacks:

@@ -152,13 +152,7 @@ def _detail(answer: httpx.Response) -> str:
 
 
 def token_from(file: str | None) -> str:
-    """Return a token from a file, else from the environment.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return a token from a file, else from the environment; InputError if there is none."""
     from dubins_traffic.files import read_text
 
     token = read_text(file) if file else os.environ.get(TOKEN, "")
@@ -188,10 +182,7 @@ class Address:
 def competition_at(url: str) -> tuple[Address, str | None]:
     """Return where a competition is by the address of its page, and the phase if it is that of a phase.
 
-    Raises
-    ------
-    InputError
-        If it is not such an address.
+    InputError if it is not such an address.
     """
     found = _COMPETITION.fullmatch(url)
     if found is None:
@@ -220,12 +211,7 @@ def submission_at(url: str) -> Address:
 def fetched_competition(url: str) -> Competition:
     """Return the competition at an address, to evaluate at home.
 
-    Raises
-    ------
-    InputError
-        If there is none there.
-    AwayError
-        If the service does not answer.
+    InputError if there is none there; AwayError if the service does not answer.
     """
     asked, _ = competition_at(url)
     return Competition.from_document(asked.connection().get(f"{asked.path}/file"), url)
@@ -234,10 +220,7 @@ def fetched_competition(url: str) -> Competition:
 def packed(path: Path) -> tuple[str, bytes]:
     """Return the name and the bytes of what is handed in; a folder becomes a zip archive, always of the same bytes.
 
-    Raises
-    ------
-    InputError
-        If it can't be read, or holds what no submission may hold.
+    InputError if it can't be read, or holds what no submission may hold.
     """
     if not path.is_dir():
         return path.name, read_bytes(path)
@@ -251,12 +234,8 @@ def packed(path: Path) -> tuple[str, bytes]:
 def submit(url: str, path: Path, token: str) -> tuple[str, dict[str, Any]]:
     """Hand in a submission to the phase at an address; return the address of its page, and what may be seen of it.
 
-    Raises
-    ------
-    InputError
-        If the service refuses it: a closed phase, a quota that is used up, no team.
-    AwayError
-        If the service does not answer.
+    InputError if the service refuses it: a closed phase, a quota that is used up, no team; AwayError if the service
+    does not answer.
     """
     asked = phase_at(url)
     name, data = packed(path)

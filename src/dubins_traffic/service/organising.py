@@ -178,10 +178,7 @@ def close_phase(service: Service, session: Session, phase: Phase, by: Account) -
 def reveal(service: Service, session: Session, phase: Phase, by: Account) -> None:
     """Reveal the secret seeds of a phase that has closed and whose submissions have all ended.
 
-    Raises
-    ------
-    RefusedError
-        If the phase has no secret seeds, is not over, or something of it is still to be run.
+    RefusedError if the phase has no secret seeds, is not over, or something of it is still to be run.
     """
     at = service.clock()
     active = Submission.state.in_(submissions.ACTIVE)

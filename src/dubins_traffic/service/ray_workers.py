@@ -109,10 +109,8 @@ class Carrier:
     def carry(self) -> None:
         """Carry the workers until this process is told to end; what they have on lease is given back then.
 
-        Raises
-        ------
-        DubinsTrafficError
-            If a node is not fit for this work: it can't hold strangers' programs, or has another version.
+        DubinsTrafficError if a node is not fit for this work: it can't hold strangers' programs, or has another
+        version.
         """
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._leave)

@@ -85,10 +85,7 @@ def cancel(service: Service, account: Account, number: int) -> None:
 def name_it(service: Service, account: Account, number: int) -> None:
     """Let a submission be the one of its team that counts in its phase.
 
-    Raises
-    ------
-    RefusedError
-        If the phase is over, or the submission was rejected or cancelled.
+    RefusedError if the phase is over, or the submission was rejected or cancelled.
     """
 
     def choose(session: Session) -> None:

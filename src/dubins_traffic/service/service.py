@@ -67,10 +67,7 @@ class Settings(Strict):
 def load_settings(folder: Path) -> Settings:
     """Return the settings in the folder of a service, those that are not set at their defaults.
 
-    Raises
-    ------
-    InputError
-        If the file can't be read or something in it is wrong.
+    InputError if the file can't be read or something in it is wrong.
     """
     path = folder / FILE
     if not exists(path):
@@ -158,10 +155,7 @@ class Service:
     def hiding(self, row: Phase) -> Hiding:
         """Return what hides the results of a phase, all that is kept of them; of one that shows all, nothing is hidden.
 
-        Raises
-        ------
-        InputError
-            If there is no key.
+        InputError if there is no key.
         """
         if row.shows == "all":
             return NOTHING

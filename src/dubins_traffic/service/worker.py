@@ -70,10 +70,7 @@ class Worker:
     def work(self) -> None:
         """Work until `stop`, then hang up; a service that is away is waited for.
 
-        Raises
-        ------
-        InputError
-            If this machine can't hold a stranger's program, and the worker does not trust submissions.
+        InputError if this machine can't hold a stranger's program, and the worker does not trust submissions.
         """
         check_boxes(trust=self._trust)
         with contextlib.closing(self._service):

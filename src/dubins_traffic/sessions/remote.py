@@ -77,12 +77,8 @@ def run_remote(session: Session) -> Iterator[Result]:
 
     A trial that ends by a peer's fault is a result like any other, and the next one follows. The link is left open.
 
-    Raises
-    ------
-    TransportError
-        If the transport is lost; after the result of the trial that was running.
-    InputError
-        If an instance has no e-agent of a name in `remote`.
+    TransportError if the transport is lost; after the result of the trial that was running; InputError if an instance
+    has no e-agent of a name in `remote`.
     """
     maestro = session.maestro
     session.link.inbox.warn = session.say
@@ -137,10 +133,7 @@ def check_lost(link: Link) -> None:
 def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
     """Return `instance` with the e-agents named in `remote` made remote.
 
-    Raises
-    ------
-    InputError
-        If it has no e-agent of one of these names.
+    InputError if it has no e-agent of one of these names.
     """
     wanted = set(remote)
     for name in sorted(wanted - set(instance.names[1:])):
@@ -232,12 +225,8 @@ def run_under(session: Session, maestro: ForeignMaestro, shortest: float) -> Ite
     trial lasts until the maestro ends it, and that is its duration. A trial that the maestro ends more than half a
     second before the `shortest` duration (seconds) counts as reset.
 
-    Raises
-    ------
-    TransportError
-        If the transport is lost; after the result of the trial that was running.
-    InputError
-        If an instance has no e-agent of a name in the session's `remote`.
+    TransportError if the transport is lost; after the result of the trial that was running; InputError if an instance
+    has no e-agent of a name in the session's `remote`.
     """
     link = session.link
     link.inbox.warn = session.say
@@ -288,10 +277,7 @@ def _await_problem(session: Session, maestro: ForeignMaestro, instance: Instance
 def with_problem(instance: Instance, text: str) -> Instance:
     """Return `instance` with the network, goals and radius of the problem in `text`.
 
-    Raises
-    ------
-    InputError
-        If `text` is no problem.
+    InputError if `text` is no problem.
     """
     document = parse_json(text, TOPIC)
     more: dict[str, Any] = {"version": 1, "duration": 1.0, "e-agents": []}

@@ -22,10 +22,7 @@ from dubins_traffic.suites.suite import Suite
 def gather(name: str, title: str, folder: Path) -> dict[str, Any]:
     """Return the document of a suite of the cases in a folder, in the order of their names.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, or one is no case.
+    InputError if there is no such file, or one is no case.
     """
     files = sorted(folder.rglob("*.json"))
     if not files:

@@ -116,13 +116,7 @@ def file_name(suite: Suite, trials: int | None) -> str:
 
 
 def save_trials(suite: Suite, campaign: Campaign, folder: Path) -> Path:
-    """Write the results of a finished campaign beside its table, with the seconds in a file of their own.
-
-    Returns
-    -------
-    path : Path
-        The file of results.
-    """
+    """Write the results of a finished campaign beside its table, with the seconds in a file of their own."""
     known = manifest.read(folder) or {}
     found = table.read(folder, campaign, [])
     clock = table.read(folder, campaign, [], table.Kind.WALL)
@@ -291,10 +285,7 @@ class Source:
 def open_sources(places: Sequence[str]) -> list[Source]:
     """Return the files of results at some places, ``[NAME=]PATH`` each; what is there is a PATH, with ``=`` or without.
 
-    Raises
-    ------
-    InputError
-        If one can't be read, or they are not of the same suite, hash and number of trials.
+    InputError if one can't be read, or they are not of the same suite, hash and number of trials.
     """
     sources: list[Source] = []
     for place in places:
@@ -404,10 +395,7 @@ def named_entries(sources: Sequence[Source]) -> list[Named]:
 def shares(sources: Sequence[Source]) -> list[str]:
     """Return a sentence for each entry that played a strategy of another tool: which share of decisions it made.
 
-    Raises
-    ------
-    InputError
-        If a name stands twice, or a share is none.
+    InputError if a name stands twice, or a share is none.
     """
     lines: list[str] = []
     for one in named_entries(sources):

@@ -51,13 +51,7 @@ Found = dict[str, dict[str, dict[str, Any]]]
 
 
 def case_instance(entry: CaseEntry) -> Instance:
-    """Return the instance of a case.
-
-    Raises
-    ------
-    InputError
-        If it is none, or leaves something to be drawn.
-    """
+    """Return the instance of a case; InputError if it is none, or leaves something to be drawn."""
     left = [name for name in ("starts", "duration", "seed", "trial") if name not in entry.document]
     if left:
         raise InputError("a case that leaves something to be drawn", field=f"{entry.name}.{left[0]}")
@@ -67,10 +61,7 @@ def case_instance(entry: CaseEntry) -> Instance:
 def case_instances(entries: Sequence[CaseEntry]) -> dict[str, Instance]:
     """Return the instances of cases by their names.
 
-    Raises
-    ------
-    InputError
-        If one is none, leaves something to be drawn, or is another one once more.
+    InputError if one is none, leaves something to be drawn, or is another one once more.
     """
     instances = {entry.name: case_instance(entry) for entry in entries}
     names: dict[str, str] = {}

@@ -168,10 +168,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
 def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
     """Return the columns of each entry in files of results, one value a case.
 
-    Raises
-    ------
-    InputError
-        If the suite is another one here, a name stands twice, or a file has not the cases of the suite.
+    InputError if the suite is another one here, a name stands twice, or a file has not the cases of the suite.
     """
     check_suite(suite, sources)
     count = len(suite.model.cases or ())
@@ -191,13 +188,7 @@ def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
 
 
 def answers_of(suite: Suite, sources: Sequence[Source]) -> list[Answers]:
-    """Return the answers in files of results.
-
-    Raises
-    ------
-    InputError
-        If the suite is another one here, or a name stands twice.
-    """
+    """Return the answers in files of results; InputError if the suite is another one here, or a name stands twice."""
     check_suite(suite, sources)
     found: list[Answers] = []
     for source in sources:

@@ -193,10 +193,7 @@ class Answer:
     def explain(self, progress: Progress | None = None) -> list[str]:
         """Return why the ego wins, or how it is stopped and what to assume so that it is not.
 
-        Raises
-        ------
-        InputError
-            If a game that would have to be solved for it is too large.
+        InputError if a game that would have to be solved for it is too large.
         """
         if self.realizable is True:
             return [self._waits(target, ranks) for target, ranks in enumerate(self.solution.ranks)]

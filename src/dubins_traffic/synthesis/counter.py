@@ -41,13 +41,7 @@ class Counterstrategy:
     _turns: dict[tuple[int, int], Ints] = field(default_factory=dict[tuple[int, int], Ints], repr=False)
 
     def level(self, position: int) -> int:
-        """Return which of the losses a position belongs to.
-
-        Raises
-        ------
-        InputError
-            If the ego wins there.
-        """
+        """Return which of the losses a position belongs to; InputError if the ego wins there."""
         for level, loss in enumerate(self.solution.losses):
             if loss.lost[position]:
                 return level

@@ -63,13 +63,7 @@ class Strategy:
         return 0 <= position < self.board.positions and all(own.rank[position] >= 0 for own in self.ranks)
 
     def first(self) -> int:
-        """Return the first position from which the strategy wins.
-
-        Raises
-        ------
-        InputError
-            If there is none.
-        """
+        """Return the first position from which the strategy wins; InputError if there is none."""
         won = np.logical_and.reduce([own.rank >= 0 for own in self.ranks])
         if not won.any():
             raise InputError("a strategy that wins from nowhere", expected="some position")
@@ -78,10 +72,7 @@ class Strategy:
     def choose(self, position: int, goal: int) -> int:
         """Return the position to which the ego moves from `position`, or that itself if it stays.
 
-        Raises
-        ------
-        InputError
-            If the strategy does not win from there.
+        InputError if the strategy does not win from there.
         """
         board = self.board
         out = room(board, 1, LARGEST_CHOICE)

@@ -45,13 +45,7 @@ class Answer:
 
 
 def message_in(line: bytes) -> dict[str, Any]:
-    """Return the message of a line.
-
-    Raises
-    ------
-    AnswerError
-        If it is none, or says that the controller has given up or failed.
-    """
+    """Return the message of a line; AnswerError if it is none, or says that the controller has given up or failed."""
     try:
         message: Any = json.loads(line)
     except (ValueError, RecursionError):
@@ -86,10 +80,7 @@ def command_of(message: dict[str, Any]) -> Answer | None:
 def command_in(line: bytes, tick: int) -> Answer:
     """Return the command that answers frame `tick`.
 
-    Raises
-    ------
-    AnswerError
-        If the line is anything else, or says that the controller has given up or failed.
+    AnswerError if the line is anything else, or says that the controller has given up or failed.
     """
     answer = command_of(message_in(line))
     if answer is None:

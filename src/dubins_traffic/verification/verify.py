@@ -101,13 +101,7 @@ Scores: TypeAlias = Sequence[Mapping[str, Any]]
 
 
 def read_sheet(file: str) -> Scores:
-    """Return the scores in a file.
-
-    Raises
-    ------
-    InputError
-        If it can't be read, or is no score sheet.
-    """
+    """Return the scores in a file; InputError if it can't be read, or is no score sheet."""
     trials = parse_json(read_text(file), file).get("trials")
     if isinstance(trials, list):
         entries = cast("list[Any]", trials)
@@ -125,10 +119,7 @@ def entry_of(record: str, scores: Scores) -> Mapping[str, Any] | None:
 def sheet_beside(record: Path) -> tuple[Path, Scores] | None:
     """Return the score sheet beside a record, and its scores; None if there is none, or it does not name the record.
 
-    Raises
-    ------
-    InputError
-        If there is a file of that name that is no score sheet.
+    InputError if there is a file of that name that is no score sheet.
     """
     path = record.with_name(BESIDE)
     if not path.is_file():

@@ -65,10 +65,7 @@ def examine(folder: Path) -> Iterator[Finding]:
 def drive_ahead(installation: Installation) -> None:
     """Start a server, let one car drive for a second, and end it.
 
-    Raises
-    ------
-    InputError
-        If anything of this fails, or the car is not where it should be.
+    InputError if anything of this fails, or the car is not where it should be.
     """
     text = world([Pose(0.0, 0.0, 1.0, 0.0)], Disc(), (), 1.0 / STEPS, str(installation.plugin))
     server = None
@@ -181,10 +178,7 @@ def _unpack(folder: Path, root: Path, progress: Progress) -> None:
 def fetch_packages(folder: Path, progress: Progress) -> None:
     """Fetch and unpack Debian's packages of Gazebo below `folder`, by a script that goes on where it stopped.
 
-    Raises
-    ------
-    InputError
-        If it could not; says what the script said last.
+    InputError if it could not; says what the script said last.
     """
     beside = Path(__file__).with_name(SCRIPT)
     script = beside if beside.is_file() else Path(__file__).parents[4] / "scripts" / SCRIPT
@@ -229,13 +223,7 @@ def own_server() -> Path | None:
 
 
 def server_version(server: Path, root: Path | None) -> str:
-    """Return the version that gzserver reports.
-
-    Raises
-    ------
-    InputError
-        If it does not run here.
-    """
+    """Return the version that gzserver reports; InputError if it does not run here."""
     around = {} if root is None else prefix.surroundings(root)
     try:
         done = subprocess.run(

@@ -76,10 +76,7 @@ class Link:
     def ask(self, kind: Kind, values: Floats) -> Floats:
         """Send a message and return the numbers of its answer.
 
-        Raises
-        ------
-        LostError
-            If no answer comes within the patience, the other end has gone, or it does not know the message.
+        LostError if no answer comes within the patience, the other end has gone, or it does not know the message.
         """
         self.send(kind, values)
         return self.receive(kind)

@@ -95,10 +95,7 @@ def place(prefix: str | os.PathLike[str] | None = None) -> Path:
 def find(prefix: str | os.PathLike[str] | None = None) -> Installation:
     """Return the installation in `prefix` (see `place`), checked as far as can be without starting it.
 
-    Raises
-    ------
-    InputError
-        If there is none, it was not finished, or what it was finished with has gone or is of another version.
+    InputError if there is none, it was not finished, or what it was finished with has gone or is of another version.
     """
     folder = place(prefix)
     manifest = read_manifest(folder)
@@ -170,13 +167,7 @@ def folder_name() -> str:
 
 
 def compiler() -> str:
-    """Return the C++ compiler: that of the variable CXX, else g++.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the C++ compiler: that of the variable CXX, else g++; InputError if there is none."""
     name = os.environ.get("CXX") or "g++"
     found = shutil.which(name)
     if found is None:

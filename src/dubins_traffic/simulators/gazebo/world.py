@@ -462,10 +462,7 @@ def write_sdf(
 ) -> None:
     """Write `to_sdf` to a file `*.sdf`, whole or not at all.
 
-    Raises
-    ------
-    InputError
-        If the path is refused (`files.require_output`), or the file can't be written.
+    InputError if the path is refused (`files.require_output`), or the file can't be written.
     """
     require_output(path, "a world", packed(".sdf"), overwrite=overwrite)
     write_text(Path(path), to_sdf(what, version))

@@ -204,10 +204,7 @@ class MachineAdviser:
 
         It seeks goals in an order of its own, so `goal` and `following` don't matter.
 
-        Raises
-        ------
-        DubinsTrafficError
-            If the machine begins elsewhere, or has made no move of the game, and there is no fallback.
+        DubinsTrafficError if the machine begins elsewhere, or has made no move of the game, and there is no fallback.
         """
         self._follow(play)
         turn, nodes = self._turn, len(self.board.arena.nodes)

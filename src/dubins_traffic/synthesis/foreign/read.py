@@ -25,10 +25,7 @@ FORMS: Final = "HOA, AIGER, slugs' JSON or explicit text, or TuLiP's Python file
 def read_machine(path: str | Path) -> Machine:
     """Return the machine in a file; what it is in is told by its content.
 
-    Raises
-    ------
-    InputError
-        If it can't be read, is none of these, or is damaged.
+    InputError if it can't be read, is none of these, or is damaged.
     """
     name = str(path)
     data = read_bytes(name, most=MOST_BYTES)

@@ -80,13 +80,7 @@ def add_generated(folder: str, names: Sequence[str]) -> None:
 
 
 def ros(module: str) -> Any:
-    """Return a module of Debian's ROS packages.
-
-    Raises
-    ------
-    MissingRosError
-        If it is not installed.
-    """
+    """Return a module of Debian's ROS packages; MissingRosError if it is not installed."""
     enable()
     try:
         return importlib.import_module(module)
@@ -198,12 +192,8 @@ def _put(folder: Path, suffix: str, *, overwrite: bool) -> Generator[Path]:
 def write_python(folder: Path, *, overwrite: bool = False) -> None:
     """Write our messages as Python packages below `folder`.
 
-    Raises
-    ------
-    InputError
-        If a file is there and `overwrite` is not given, or it can't be written.
-    MissingRosError
-        If Debian's generator or the definitions that ours use are not installed.
+    InputError if a file is there and `overwrite` is not given, or it can't be written; MissingRosError if Debian's
+    generator or the definitions that ours use are not installed.
     """
     generator, write_modules = ros("genpy.generator"), ros("genpy.generate_initpy").write_modules
     search = _search_path()
@@ -224,12 +214,8 @@ def write_python(folder: Path, *, overwrite: bool = False) -> None:
 def write_cpp(folder: Path, *, overwrite: bool = False) -> None:
     """Write our messages as C++ headers below `folder`, for a compiler's -I.
 
-    Raises
-    ------
-    InputError
-        If a file is there and `overwrite` is not given, or it can't be written.
-    MissingRosError
-        If Debian's generator for C++ is not installed.
+    InputError if a file is there and `overwrite` is not given, or it can't be written; MissingRosError if Debian's
+    generator for C++ is not installed.
     """
     if not GENCPP.is_file():
         raise MissingRosError("python3-gencpp")
