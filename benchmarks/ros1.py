@@ -25,9 +25,8 @@ from dubins_traffic.runs.single import run_trial
 from dubins_traffic.sessions.plan import rehearse
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.link import Link
-from dubins_traffic.transports.ros1.debian import MissingRosError
 from dubins_traffic.transports.ros1.master import Master
-from dubins_traffic.transports.ros1.messages import load, write_python
+from dubins_traffic.transports.ros1.messages import MissingRosError, load, write_python
 from dubins_traffic.transports.ros1.node import join, leave
 from dubins_traffic.transports.ros1.transport import COMMANDS, Ros1
 

@@ -13,11 +13,10 @@ from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.kernels.random import DRAW, below
 from dubins_traffic.kernels.records import Rows, record, table
-from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.board import Tables
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
 from dubins_traffic.synthesis.moves import list_moves
-from dubins_traffic.synthesis.positions import Moves, Work
+from dubins_traffic.synthesis.positions import Moves, Numbers, Work
 from dubins_traffic.synthesis.strategy import Strategy
 
 

@@ -16,9 +16,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from dubins_traffic.transports.ros1.debian import DIST_PACKAGES
 from dubins_traffic.transports.ros1.master import answers
-from dubins_traffic.transports.ros1.messages import write_python
+from dubins_traffic.transports.ros1.messages import DIST_PACKAGES, write_python
 from tests.ports import kept_port
 from tests.tools import need, need_programs
 

@@ -13,7 +13,7 @@ import httpx
 from obstore.store import LocalStore, from_url
 from sqlalchemy import func, select
 
-from dubins_traffic.service.connection import TOKEN
+from dubins_traffic.service.client import TOKEN
 from dubins_traffic.service.database import Database
 from dubins_traffic.service.storage import Storage
 from dubins_traffic.service.tables import Chunk, Submission, Trial

@@ -8,9 +8,8 @@ from typing import TypeAlias
 
 from dubins_traffic.cars.state import EGO, NONE, Frames
 from dubins_traffic.logic.automaton import VERDICTS
-from dubins_traffic.logic.formula import TRUE, Formula, conj, propositions
+from dubins_traffic.logic.formula import TRUE, Formula, always, conj, eventually, propositions
 from dubins_traffic.logic.monitor import Monitors
-from dubins_traffic.logic.temporal import always, eventually
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach

@@ -11,8 +11,7 @@ import sys
 from pathlib import Path
 
 from dubins_traffic.cli.main import main
-from dubins_traffic.suites.comparing import open_sources
-from dubins_traffic.suites.results import WALL
+from dubins_traffic.suites.results import WALL, open_sources
 from dubins_traffic.suites.suite import load_suite
 from dubins_traffic.suites.writing import PAGE, TABLE, results
 

@@ -18,7 +18,7 @@ from dubins_traffic.errors import TransportError
 from dubins_traffic.problem.public_problem import problem_to_document
 from dubins_traffic.protocols import End, Ending, Mailbox, View
 from dubins_traffic.sessions.registry import Option, TransportEntry
-from dubins_traffic.transports.observed import observation_to_document
+from dubins_traffic.transports.line_messages import observation_to_document
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance

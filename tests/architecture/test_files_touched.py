@@ -26,7 +26,7 @@ TOUCHED = {
 }
 """Of one of each: how files know it, and which do, two at most."""
 KNOW_IT_BY_NAME = {
-    "e-agent": {"synthesis.export", "synthesis.queues"},
+    "e-agent": {"synthesis.game", "synthesis.queues"},
 }
 """What has the same word for something else: cars that are parked in a game."""
 

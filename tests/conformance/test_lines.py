@@ -18,10 +18,10 @@ from dubins_traffic.runs.single import run_trial
 from dubins_traffic.sessions.remote import Session, hand_over, run_remote
 from dubins_traffic.transports.clocks import Lockstep
 from dubins_traffic.transports.inbox import Inbox
+from dubins_traffic.transports.line_messages import observation_from_document, observation_to_document
 from dubins_traffic.transports.lines import Lines
 from dubins_traffic.transports.lines_client import drive
 from dubins_traffic.transports.link import Link
-from dubins_traffic.transports.observed import observation_from_document, observation_to_document
 from tests.conformance.transport import BRIEF, PATIENT, UntypedConformance, answer, frames
 from tests.recordings import make_instance
 from tests.unit.test_bad_documents import base

@@ -30,9 +30,8 @@ from dubins_traffic.record.sink import End
 from dubins_traffic.record.wall import read
 from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.sessions.remote import Session, hand_over, run_remote
-from dubins_traffic.transports.clocks import Lockstep, RealTime
+from dubins_traffic.transports.clocks import Lockstep, Patience, RealTime
 from dubins_traffic.transports.link import Link
-from dubins_traffic.transports.patience import Patience
 from tests.recordings import make_instance
 
 BRIEF = Patience(begin=600.0, silence=3.0, absence=3.0, flood=1000, settle=0.3)

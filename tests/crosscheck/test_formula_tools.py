@@ -13,12 +13,10 @@ import numpy as np
 import pytest
 
 from dubins_traffic.logic.exports import Specification, spin, stl, tulip
-from dubins_traffic.logic.formula import Brackets, Formula, Op, Style, subformulas, written
+from dubins_traffic.logic.formula import SPIN, Brackets, Formula, Op, Style, subformulas, to_spin, written
 from dubins_traffic.logic.parse import parse
-from dubins_traffic.logic.printer import SPIN, to_spin
-from dubins_traffic.logic.rewrite import simplify
+from dubins_traffic.logic.rewrite import simplify, until_and_release_only
 from dubins_traffic.logic.robustness import robustness
-from dubins_traffic.logic.translation import until_and_release_only
 from tests.formulas import drawn
 from tests.tools import interpreter_with, program
 

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.export import save_game
-from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.game import build, save_game
 from dubins_traffic.synthesis.solver import solve
 from tests.games import ALL, board, pan
 

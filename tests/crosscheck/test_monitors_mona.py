@@ -10,9 +10,8 @@ from random import Random
 import pytest
 
 from dubins_traffic.logic.automaton import PRESUMABLY_FALSE, PRESUMABLY_TRUE, automaton
-from dubins_traffic.logic.formula import Bounds, Formula, Op, subformulas
-from dubins_traffic.logic.temporal import always, eventually
-from dubins_traffic.logic.translation import until_and_release_only
+from dubins_traffic.logic.formula import Bounds, Formula, Op, always, eventually, subformulas
+from dubins_traffic.logic.rewrite import until_and_release_only
 from tests.crosscheck.test_monitors_lasso import NAMES, verdicts
 from tests.formulas import drawn, drawn_past
 from tests.tools import interpreter_with, program

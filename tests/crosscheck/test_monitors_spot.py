@@ -10,10 +10,8 @@ from random import Random
 import pytest
 
 from dubins_traffic.logic.automaton import FALSE, TRUE, automaton
-from dubins_traffic.logic.formula import Brackets, Formula, Op, Style, written
-from dubins_traffic.logic.rewrite import mapped
-from dubins_traffic.logic.temporal import until
-from dubins_traffic.logic.translation import in_ticks, until_and_release_only, written_out
+from dubins_traffic.logic.formula import Brackets, Formula, Op, Style, until, written
+from dubins_traffic.logic.rewrite import in_ticks, mapped, until_and_release_only, written_out
 from tests.crosscheck.test_monitors_lasso import NAMES, verdicts
 from tests.formulas import drawn
 from tests.tools import interpreter_with

@@ -15,10 +15,9 @@ import pytest
 
 from dubins_traffic.cli.main import main
 from dubins_traffic.logic.automaton import PRESUMABLY_TRUE
-from dubins_traffic.logic.formula import Formula, Op, make, propositions, subformulas
+from dubins_traffic.logic.formula import Formula, Op, make, propositions, subformulas, to_spin
 from dubins_traffic.logic.monitor import Monitors
 from dubins_traffic.logic.parse import parse
-from dubins_traffic.logic.printer import to_spin
 from dubins_traffic.logic.rewrite import mapped
 from dubins_traffic.logic.robustness import robustness
 from dubins_traffic.problem.configuration import load_config

@@ -21,8 +21,7 @@ from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.road_play import UNKNOWN_MOVE
-from dubins_traffic.synthesis.sightings import Ground
+from dubins_traffic.synthesis.road_play import UNKNOWN_MOVE, Ground
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
 from tests.chain_reference import RING, SNAKE, Track

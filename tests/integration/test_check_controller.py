@@ -21,8 +21,7 @@ from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.checkup.watch import Waited, see_off
 from dubins_traffic.cli.main import main
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.transports.ros1.debian import DIST_PACKAGES
-from dubins_traffic.transports.ros1.messages import write_python
+from dubins_traffic.transports.ros1.messages import DIST_PACKAGES, write_python
 from tests.ros import SYSTEM_PYTHON, need_ros
 from tests.tools import need_module
 

@@ -20,8 +20,7 @@ import pytest
 from dubins_traffic import load_record
 from dubins_traffic.cli.main import main
 from dubins_traffic.competition.competition import Competition, load_competition
-from dubins_traffic.competition.evaluating import RESULTS, evaluate, load_evaluation
-from dubins_traffic.competition.judging import FramesHash, Judged, judge
+from dubins_traffic.competition.judging import RESULTS, FramesHash, Judged, evaluate, judge, load_evaluation
 from dubins_traffic.competition.ranking import rank
 from dubins_traffic.competition.sealing import seal
 from dubins_traffic.competition.submission import Submission, check_submission

@@ -14,7 +14,7 @@ import pytest
 import typer
 
 from dubins_traffic.cli.commands import app
-from dubins_traffic.transports.ros1.debian import DIST_PACKAGES
+from dubins_traffic.transports.ros1.messages import DIST_PACKAGES
 from tests.competitions import ROAD
 from tests.extras import extras, installed, required
 

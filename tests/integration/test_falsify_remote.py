@@ -32,7 +32,7 @@ PROGRAM = """
 import json, sys
 from dubins_traffic.controllers.registry import load
 from dubins_traffic.problem.public_problem import problem_from_document
-from dubins_traffic.transports.observed import observation_from_document
+from dubins_traffic.transports.line_messages import observation_from_document
 
 for line in sys.stdin:
     message = json.loads(line)

@@ -26,11 +26,11 @@ from dubins_traffic.record.reader import replay
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Scorer
 from dubins_traffic.simulators.gazebo import prefix
-from dubins_traffic.simulators.gazebo.folder import PREFIX, Folder
 from dubins_traffic.simulators.gazebo.link import Kind, LostError
+from dubins_traffic.simulators.gazebo.server import PREFIX, Folder
 from dubins_traffic.simulators.gazebo.simulator import Gazebo
-from dubins_traffic.simulators.gazebo.vehicle import WHEEL_RADIUS
-from dubins_traffic.verification.contacts import from_poses
+from dubins_traffic.simulators.gazebo.world import WHEEL_RADIUS
+from dubins_traffic.verification.worlds import from_poses
 from tests.batches import pose, scene
 from tests.gazebo import installation
 from tests.recordings import make_instance

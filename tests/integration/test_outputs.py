@@ -23,7 +23,7 @@ from dubins_traffic.problem.files import write_document
 from dubins_traffic.record.export import export
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.simulators.gazebo.export import write_sdf
+from dubins_traffic.simulators.gazebo.world import write_sdf
 from tests.recordings import make_instance
 from tests.ros import need_ros
 

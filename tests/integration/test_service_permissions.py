@@ -10,7 +10,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service as StoredService
 from dubins_traffic.service.web.app import create_app
 from tests.services import STANDING, Person, Service, competition_text, serving, shown_secret
 
@@ -130,8 +130,8 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
 
 
 def test_the_table_names_every_route(tmp_path: Path) -> None:
-    office = Office(tmp_path / "here")
-    app = create_app(office)
+    stored = StoredService(tmp_path / "here")
+    app = create_app(stored)
     found = {
         (method, route.path_format.replace("//", "/"))
         for route in app.routes
@@ -139,7 +139,7 @@ def test_the_table_names_every_route(tmp_path: Path) -> None:
         if method not in ("OPTIONS", "HEAD")
         and not route.path.startswith(("/static", "/api/openapi", "/api:"))
     }
-    office.close()
+    stored.close()
     named = {(method, re.sub(r":\w+}", "}", path)) for method, path in ROUTES}
     assert {one for one in found if one[1] not in ("/api", "/api/{path}")} == named
 

@@ -20,7 +20,7 @@ from dubins_traffic.competition.sealing import make_key_file
 from dubins_traffic.errors import InputError
 from dubins_traffic.service import viewing
 from dubins_traffic.service.hiding import HiddenError
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service as StoredService
 from dubins_traffic.service.tables import Phase, Submission, Trial
 from tests import postgres
 from tests.services import CRASHING, Person, competition_text, serving, wait_until
@@ -144,11 +144,11 @@ def a_season(tmp_path: Path, settings: str, also: list[Path]) -> None:
 
 
 def seeds_of(folder: Path) -> dict[str, tuple[int, ...]]:
-    office = Office(folder, folder.with_suffix(".key"))
-    with office.database.reading() as session:
+    stored = StoredService(folder, folder.with_suffix(".key"))
+    with stored.database.reading() as session:
         rows = session.scalars(select(Phase).where(Phase.name.in_(SECRET))).all()
-        found = {row.name: office.seeds(row) for row in rows}
-    office.close()
+        found = {row.name: stored.seeds(row) for row in rows}
+    stored.close()
     return found
 
 
@@ -165,20 +165,20 @@ def shown_to_organisers(organiser: Person, number: int) -> None:
 def unreadable(folder: Path, other: Path, number: int) -> None:
     """With another key nothing can be read, and nothing of one trial stands for another."""
     with pytest.raises(InputError, match="no such key, and the folder has competitions"):
-        Office(folder, other)
+        StoredService(folder, other)
     make_key_file(other, folder)
-    office, own = Office(folder, other), Office(folder, folder.with_suffix(".key"))
-    with office.database.reading() as session:
+    stored, own = StoredService(folder, other), StoredService(folder, folder.with_suffix(".key"))
+    with stored.database.reading() as session:
         submission = session.get_one(Submission, number)
         with pytest.raises(HiddenError, match="another key"):
-            viewing.trial_of(office, session, submission, 0)
+            viewing.trial_of(stored, session, submission, 0)
         first, second = session.scalars(select(Trial).where(Trial.submission_id == number)).all()
         assert viewing.trial_of(own, session, submission, 0) is not None
         first.hidden, second.hidden = second.hidden, first.hidden
         with session.no_autoflush, pytest.raises(HiddenError, match="changed"):
             own.hiding(submission.phase).shown(first)
         session.rollback()
-    office.close()
+    stored.close()
     own.close()
 
 

@@ -13,7 +13,7 @@ import pytest
 from sqlalchemy import select
 
 from dubins_traffic.service import worker as room
-from dubins_traffic.service.connection import Connection
+from dubins_traffic.service.client import Connection
 from dubins_traffic.service.database import Database
 from dubins_traffic.service.tables import Chunk, Trial
 from tests.services import STANDING, competition_text, serving, shown_secret

@@ -13,9 +13,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dubins_traffic.logic.automaton import FALSE, TRUE
-from dubins_traffic.logic.formula import Formula, FormulaError, propositions
+from dubins_traffic.logic.formula import Formula, FormulaError, propositions, to_spin
 from dubins_traffic.logic.monitor import Monitors
-from dubins_traffic.logic.printer import to_spin
 from dubins_traffic.logic.robustness import outlook, robustness
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw

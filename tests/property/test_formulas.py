@@ -17,16 +17,24 @@ from dubins_traffic.logic.formula import (
     Op,
     conj,
     disj,
+    interval,
     make,
     prop,
     subformulas,
     to_ascii,
+    to_spin,
 )
 from dubins_traffic.logic.parse import parse
-from dubins_traffic.logic.printer import to_spin
-from dubins_traffic.logic.rewrite import mapped, nnf, renamed, simplify
-from dubins_traffic.logic.temporal import interval
-from dubins_traffic.logic.translation import in_ticks, until_and_release_only, without_past, written_out
+from dubins_traffic.logic.rewrite import (
+    in_ticks,
+    mapped,
+    nnf,
+    renamed,
+    simplify,
+    until_and_release_only,
+    without_past,
+    written_out,
+)
 from tests.formulas import drawn, holds, words
 
 _UNARY = (Op.NOT, Op.X, Op.F, Op.G, Op.Y, Op.Z, Op.O, Op.H)

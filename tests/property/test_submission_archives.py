@@ -11,8 +11,7 @@ from pathlib import Path
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dubins_traffic.competition.contents import Bounds, folder_files
-from dubins_traffic.competition.submission import check_submission, content_digest
+from dubins_traffic.competition.submission import Bounds, check_submission, content_digest, folder_files
 from dubins_traffic.errors import InputError
 
 BOUNDS = Bounds(upload=1 << 16, total=1 << 16, files=8)

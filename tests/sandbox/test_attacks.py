@@ -19,11 +19,10 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.sandbox import Layers, available_layers, boxed_controller
 from dubins_traffic.sandbox.attacks import ATTACKS, Attack
-from dubins_traffic.sandbox.attacks.baits import Baits
 from dubins_traffic.sandbox.launch import staged
 from dubins_traffic.sandbox.layers import BOX, CLOCK, FILES, MEMORY, NAMES, PROCESSES, SECCOMP
 from dubins_traffic.sandbox.submission import interpreter
-from dubins_traffic.sandbox.suite import strike, strikes
+from dubins_traffic.sandbox.suite import Baits, strike, strikes
 from tests.boxes import needs_boxes
 
 pytestmark = pytest.mark.tools

@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from dubins_traffic.competition import sealing
-from dubins_traffic.competition.commitment import Seeds, check_belong, read_seeds
 from dubins_traffic.competition.competition import Phase
+from dubins_traffic.competition.sealing import Seeds, check_belong, read_seeds
 from dubins_traffic.errors import InputError
 from tests.competitions import KEY, TEST, competition
 

@@ -17,9 +17,20 @@ from dubins_traffic.logic.exports import (
     tlsf,
     tulip,
 )
-from dubins_traffic.logic.formula import ASCII, Brackets, Formula, FormulaError, Style, conj, implies, written
+from dubins_traffic.logic.formula import (
+    ASCII,
+    SPIN,
+    Brackets,
+    Formula,
+    FormulaError,
+    Style,
+    conj,
+    implies,
+    written,
+    written_implication,
+    written_together,
+)
 from dubins_traffic.logic.parse import parse
-from dubins_traffic.logic.printer import SPIN, written_implication, written_together
 from tests.formulas import drawn
 from tests.grammars import TLSF, slugs_sections, tlsf_sections
 

@@ -13,28 +13,26 @@ from dubins_traffic.logic.formula import (
     TRUE,
     Formula,
     FormulaError,
+    always,
     conj,
     disj,
+    eventually,
     iff,
     implies,
     negation,
-    prop,
-    propositions,
-    to_ascii,
-)
-from dubins_traffic.logic.parse import parse
-from dubins_traffic.logic.printer import to_spin
-from dubins_traffic.logic.temporal import (
-    always,
-    eventually,
     next_,
     once,
+    prop,
+    propositions,
     release,
     since,
+    to_ascii,
+    to_spin,
     until,
     weak_until,
     yesterday,
 )
+from dubins_traffic.logic.parse import parse
 
 a, b, c, d = map(prop, "abcd")
 

@@ -15,10 +15,17 @@ from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.simulators import registry
 from dubins_traffic.simulators.gazebo import install, prefix
-from dubins_traffic.simulators.gazebo.export import Version, to_sdf
-from dubins_traffic.simulators.gazebo.roads import MARKER
-from dubins_traffic.simulators.gazebo.vehicle import TRACK, WHEEL_RADIUS, Drive
-from dubins_traffic.simulators.gazebo.world import WALL, walls, world
+from dubins_traffic.simulators.gazebo.world import (
+    MARKER,
+    TRACK,
+    WALL,
+    WHEEL_RADIUS,
+    Drive,
+    Version,
+    to_sdf,
+    walls,
+    world,
+)
 from tests.batches import pose
 from tests.recordings import make_instance
 

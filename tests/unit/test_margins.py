@@ -13,9 +13,8 @@ import pytest
 from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.cli.main import main
-from dubins_traffic.logic.formula import disj, implies, negation, prop
+from dubins_traffic.logic.formula import always, disj, eventually, implies, negation, prop
 from dubins_traffic.logic.robustness import robustness
-from dubins_traffic.logic.temporal import always, eventually
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read

@@ -12,9 +12,9 @@ from rich.console import Console
 
 from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
-from dubins_traffic.campaign.report import terminal, worst
+from dubins_traffic.campaign.report import worst, write
 from dubins_traffic.campaign.report.comparison import Comparison, compare
-from dubins_traffic.campaign.report.page import page
+from dubins_traffic.campaign.report.write import page
 from dubins_traffic.cli import tables
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.sink import BY_CONTROLLER
@@ -237,7 +237,7 @@ def campaign_of(folder: Path, *found: tuple[End, Score]) -> tuple[Comparison, An
 
 def told(comparison: Comparison) -> str:
     stream = StringIO()
-    for one in terminal.tables(comparison):
+    for one in write.tables(comparison):
         Console(width=80, file=stream).print(one)
     return stream.getvalue()
 

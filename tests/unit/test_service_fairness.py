@@ -13,7 +13,7 @@ from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.hiding import NOTHING
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import RefusedError, Upload
 from dubins_traffic.service.tables import Account, Chunk, Phase, Submission, Trial
 from tests.services import competition_text
@@ -32,25 +32,27 @@ class Clock:
 
 
 @pytest.fixture
-def office(tmp_path: Path) -> Iterator[Office]:
-    made = Office(tmp_path / "here", tmp_path / "here.key", Clock())
+def service(tmp_path: Path) -> Iterator[Service]:
+    made = Service(tmp_path / "here", tmp_path / "here.key", Clock())
     made.database.migrate()
     organising.create(made, "short", {"competition.toml": competition_text(12).encode()}, None)
     yield made
     made.close()
 
 
-def joined(office: Office, name: str = "Ann", team: str = "Ants") -> Account:
+def joined(service: Service, name: str = "Ann", team: str = "Ants") -> Account:
     """Let a person join with a team of its own."""
-    with office.database.writing() as session:
+    with service.database.writing() as session:
         code = accounts.invite(session, accounts.PARTICIPANT, None, NOW)
         return accounts.register(session, code, name, "correct horse", team, NOW)
 
 
-def handed(session: Session, office: Office, account: Account, name: str, phase: str = "test") -> Submission:
+def handed(
+    session: Session, service: Service, account: Account, name: str, phase: str = "test"
+) -> Submission:
     row = receiving.found_phase(session, "short", phase)
     upload = Upload(accounts.digest_of(name), name, 1)
-    return submissions.receive(session, row, QUOTA, account, upload, office.clock())[0]
+    return submissions.receive(session, row, QUOTA, account, upload, service.clock())[0]
 
 
 def checked(session: Session, submission: Submission, trials: int = 12) -> None:
@@ -79,21 +81,21 @@ def results(numbers: list[int], frames: str = "f") -> list[dict[str, object]]:
     return [{"number": number, "frames": frames, "ran": "boxed", **same} for number in numbers]
 
 
-def test_what_was_cancelled_while_it_ran_does_not_run_again_for_the_same_price(office: Office) -> None:
-    ann = joined(office)
-    with office.database.writing() as session:
-        submission = handed(session, office, ann, "x")
+def test_what_was_cancelled_while_it_ran_does_not_run_again_for_the_same_price(service: Service) -> None:
+    ann = joined(service)
+    with service.database.writing() as session:
+        submission = handed(session, service, ann, "x")
         checked(session, submission)
         submissions.record(session, taken(session), results(list(range(10))), NOW, NOTHING)
         submissions.cancel(session, submission, NOW)
-        again = handed(session, office, ann, "x")
+        again = handed(session, service, ann, "x")
         assert (again.id, again.state, again.costs, again.run) == (submission.id, "cancelled", True, 0)
 
 
-def test_what_ran_and_is_judged_again_is_not_free_when_it_is_cancelled(office: Office) -> None:
-    ann = joined(office)
-    with office.database.writing() as session:
-        submission = handed(session, office, ann, "x")
+def test_what_ran_and_is_judged_again_is_not_free_when_it_is_cancelled(service: Service) -> None:
+    ann = joined(service)
+    with service.database.writing() as session:
+        submission = handed(session, service, ann, "x")
         checked(session, submission)
         submissions.record(session, taken(session), results(list(range(10))), NOW, NOTHING)
         submissions.judge_again(session, submission, range(12), NOW)
@@ -102,40 +104,40 @@ def test_what_ran_and_is_judged_again_is_not_free_when_it_is_cancelled(office: O
         assert submission.costs
 
 
-def test_the_same_is_not_sent_and_cancelled_for_ever(office: Office) -> None:
-    ann = joined(office)
-    with office.database.writing() as session:
+def test_the_same_is_not_sent_and_cancelled_for_ever(service: Service) -> None:
+    ann = joined(service)
+    with service.database.writing() as session:
         for _ in range(submissions.MOST_REPEATS + 1):
-            submissions.cancel(session, handed(session, office, ann, "x"), NOW)
+            submissions.cancel(session, handed(session, service, ann, "x"), NOW)
         with pytest.raises(RefusedError, match="too often"):
-            handed(session, office, ann, "x")
+            handed(session, service, ann, "x")
 
 
-def test_who_was_disqualified_is_not_let_in_by_sending_the_same_again(office: Office) -> None:
-    ann = joined(office)
-    with office.database.writing() as session:
-        submission = handed(session, office, ann, "x")
-        organising.disqualify(office, session, submission, ann, "it tried to get out")
+def test_who_was_disqualified_is_not_let_in_by_sending_the_same_again(service: Service) -> None:
+    ann = joined(service)
+    with service.database.writing() as session:
+        submission = handed(session, service, ann, "x")
+        organising.disqualify(service, session, submission, ann, "it tried to get out")
         submissions.cancel(session, submission, NOW)
-        again = handed(session, office, ann, "x")
+        again = handed(session, service, ann, "x")
         assert (again.state, again.disqualified) == ("received", "it tried to get out")
 
 
-def test_what_is_refused_fills_no_disk(office: Office) -> None:
-    ann = joined(office)
+def test_what_is_refused_fills_no_disk(service: Service) -> None:
+    ann = joined(service)
 
     def kept() -> int:
-        return sum(1 for path in (office.folder / "store").rglob("*") if path.is_file())
+        return sum(1 for path in (service.folder / "store").rglob("*") if path.is_file())
 
     def send(text: str, phase: str = "test") -> None:
-        receiving.take_in(office, ann, "short", phase, "x.py", text.encode())
+        receiving.take_in(service, ann, "short", phase, "x.py", text.encode())
 
     for text in ("1", "2", "3"):
         send(text)
     assert kept() == 3
     with pytest.raises(RefusedError, match="3 of 3 submissions today"):
         send("4")
-    with office.database.writing() as session:
+    with service.database.writing() as session:
         receiving.found_phase(session, "short", "test").closes = NOW - 1.0
     with pytest.raises(RefusedError, match="closed"):
         send("5")
@@ -143,10 +145,10 @@ def test_what_is_refused_fills_no_disk(office: Office) -> None:
     send("1")
 
 
-def test_a_team_sends_so_many_bytes_an_hour(office: Office) -> None:
+def test_a_team_sends_so_many_bytes_an_hour(service: Service) -> None:
     """What is rejected costs no quota, yet it lies in the store."""
-    ann = joined(office)
-    with office.database.writing() as session:
+    ann = joined(service)
+    with service.database.writing() as session:
         row = receiving.found_phase(session, "short", "practice")
         for name in ("a", "b"):
             big = Upload(accounts.digest_of(name), name, submissions.MOST_BYTES // 2)
@@ -158,10 +160,10 @@ def test_a_team_sends_so_many_bytes_an_hour(office: Office) -> None:
         assert submissions.receive(session, row, Quota(), ann, upload, NOW + submissions.HOUR)[1]
 
 
-def test_a_slow_submission_that_goes_on_does_not_fail_by_our_fault(office: Office) -> None:
-    ann = joined(office)
-    with office.database.writing() as session:
-        submission = handed(session, office, ann, "x")
+def test_a_slow_submission_that_goes_on_does_not_fail_by_our_fault(service: Service) -> None:
+    ann = joined(service)
+    with service.database.writing() as session:
+        submission = handed(session, service, ann, "x")
         checked(session, submission)
         late = NOW + submissions.DEADLINES["queued"] - 1.0
         chunk = taken(session, late)
@@ -173,13 +175,13 @@ def test_a_slow_submission_that_goes_on_does_not_fail_by_our_fault(office: Offic
         assert submission.state == "failed"
 
 
-def test_a_chunk_that_takes_long_is_reported_in_parts_and_others_come_between(office: Office) -> None:
-    ann, bob = joined(office), joined(office, "Bob", "Bees")
-    with office.database.writing() as session:
-        slow = handed(session, office, ann, "slow")
+def test_a_chunk_that_takes_long_is_reported_in_parts_and_others_come_between(service: Service) -> None:
+    ann, bob = joined(service), joined(service, "Bob", "Bees")
+    with service.database.writing() as session:
+        slow = handed(session, service, ann, "slow")
         checked(session, slow)
         chunk = taken(session)
-        other = handed(session, office, bob, "other")
+        other = handed(session, service, bob, "other")
         submissions.record(session, chunk, results([0, 1]), NOW, NOTHING)
         assert taken(session).submission_id == other.id
         while (next_one := queue.take(session, "w", NOW, 60.0)) is not None:
@@ -190,11 +192,11 @@ def test_a_chunk_that_takes_long_is_reported_in_parts_and_others_come_between(of
             submissions.record(session, chunk, [], NOW, NOTHING)
 
 
-def test_the_sample_is_compared_whatever_ends_first(office: Office) -> None:
+def test_the_sample_is_compared_whatever_ends_first(service: Service) -> None:
     """It is queued when all trials are there; before, a second worker could end it first, and it was lost."""
-    ann = joined(office)
-    with office.database.writing() as session:
-        submission = handed(session, office, ann, "x")
+    ann = joined(service)
+    with service.database.writing() as session:
+        submission = handed(session, service, ann, "x")
         checked(session, submission)
         leased = [taken(session), taken(session)]
         assert queue.take(session, "w", NOW, 60.0) is None
@@ -203,7 +205,7 @@ def test_the_sample_is_compared_whatever_ends_first(office: Office) -> None:
         again = taken(session)
         assert again.kind == "again"
         submissions.record(session, again, results(again.numbers, "g"), NOW, NOTHING)
-        assert viewing.differing(office, session, submission) == again.numbers
+        assert viewing.differing(service, session, submission) == again.numbers
 
 
 def test_nobody_knows_which_trials_run_twice() -> None:
@@ -214,57 +216,57 @@ def test_nobody_knows_which_trials_run_twice() -> None:
     assert submissions.sample([7]) == [7]
 
 
-def test_a_secret_phase_shows_no_time_at_which_something_happened(office: Office) -> None:
+def test_a_secret_phase_shows_no_time_at_which_something_happened(service: Service) -> None:
     """A deadline moves with the state: it told when a submission began to run, and when each part of it was done."""
-    ann = joined(office)
+    ann = joined(service)
     seen: list[object] = []
-    with office.database.writing() as session:
-        submission = handed(session, office, ann, "x")
+    with service.database.writing() as session:
+        submission = handed(session, service, ann, "x")
         checked(session, submission)
         for at in (NOW + 100.0, NOW + 200.0):
             submissions.enter(submission, "running", at)
-            seen.append(viewing.told_submission(office, session, submission, ann, {}))
-        open_phase = handed(session, office, ann, "y", "practice")
-        assert viewing.told_submission(office, session, open_phase, ann, {})["deadline"] is not None
+            seen.append(viewing.told_submission(service, session, submission, ann, {}))
+        open_phase = handed(session, service, ann, "y", "practice")
+        assert viewing.told_submission(service, session, open_phase, ann, {})["deadline"] is not None
     assert seen[0] == seen[1]
 
 
-def test_what_was_not_checked_is_not_judged_again(office: Office) -> None:
+def test_what_was_not_checked_is_not_judged_again(service: Service) -> None:
     """Its trials would be found to be none by every worker, and it would fail by our fault, free of charge."""
-    ann = joined(office)
-    with office.database.writing() as session:
-        submission = handed(session, office, ann, "x")
+    ann = joined(service)
+    with service.database.writing() as session:
+        submission = handed(session, service, ann, "x")
         with pytest.raises(RefusedError, match="checked"):
             submissions.judge_again(session, submission, range(12), NOW)
         assert session.scalar(select(func.count()).select_from(Trial)) == 0
 
 
-def test_names_are_one_s_own_in_every_spelling_and_their_owner_can_log_in(office: Office) -> None:
+def test_names_are_one_s_own_in_every_spelling_and_their_owner_can_log_in(service: Service) -> None:
     """SQLite knows capitals of ASCII alone."""
-    joined(office, "Änne", "Ökobienen")
+    joined(service, "Änne", "Ökobienen")
     for name, team in (("änne", "x"), ("Bob", "ÖKOBIENEN"), ("removed 7", "x"), ("REMOVED 7", "x")):
         with pytest.raises(WrongEntryError, match="taken"):
-            joined(office, name, team)
-    with office.database.reading() as session:
+            joined(service, name, team)
+    with service.database.reading() as session:
         for typed in ("Änne", "änne", " ÄNNE "):
             assert accounts.verified(session, typed, "correct horse") is not None
         assert accounts.verified(session, "Änne", "wrong horse!") is None
 
 
-def test_a_removed_account_is_removed_whatever_others_are_called(office: Office) -> None:
-    ann = joined(office)
-    with office.database.writing() as session:
+def test_a_removed_account_is_removed_whatever_others_are_called(service: Service) -> None:
+    ann = joined(service)
+    with service.database.writing() as session:
         accounts.remove(session, session.get_one(Account, ann.id), NOW)
-    with office.database.reading() as session:
+    with service.database.reading() as session:
         assert session.get_one(Account, ann.id).name == f"removed {ann.id}"
         assert accounts.verified(session, f"removed {ann.id}", "none") is None
 
 
-def test_another_team_s_bytes_are_another_submission(office: Office) -> None:
+def test_another_team_s_bytes_are_another_submission(service: Service) -> None:
     """Who knows what another team has sent learns nothing of it, and takes nothing from it."""
-    ann, bob = joined(office), joined(office, "Bob", "Bees")
-    with office.database.writing() as session:
-        first, second = handed(session, office, ann, "x"), handed(session, office, bob, "x")
+    ann, bob = joined(service), joined(service, "Bob", "Bees")
+    with service.database.writing() as session:
+        first, second = handed(session, service, ann, "x"), handed(session, service, bob, "x")
         assert (first.id != second.id, first.digest) == (True, second.digest)
         submissions.cancel(session, second, NOW)
         assert first.state == "received"
@@ -272,11 +274,11 @@ def test_another_team_s_bytes_are_another_submission(office: Office) -> None:
             receiving.found_submission(session, first.id, bob)
 
 
-def test_nothing_is_named_when_a_phase_has_closed(office: Office) -> None:
-    ann = joined(office)
-    with office.database.writing() as session:
-        number = handed(session, office, ann, "x").id
+def test_nothing_is_named_when_a_phase_has_closed(service: Service) -> None:
+    ann = joined(service)
+    with service.database.writing() as session:
+        number = handed(session, service, ann, "x").id
         phase: Phase = receiving.found_phase(session, "short", "test")
         phase.closes = NOW
     with pytest.raises(RefusedError, match="closed"):
-        receiving.name_it(office, ann, number)
+        receiving.name_it(service, ann, number)

@@ -16,7 +16,7 @@ from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, queue, submissions
 from dubins_traffic.service.database import Database
 from dubins_traffic.service.hiding import NOTHING
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import RefusedError, Upload
 from dubins_traffic.service.tables import Account, Act, Chunk, Competition, Phase, Submission, Trial
 from tests import postgres
@@ -144,33 +144,33 @@ def test_only_the_latest_lease_may_report(database: Database) -> None:
 
 
 def test_a_service_that_was_away_ends_no_lease(tmp_path: Path) -> None:
-    office = Office(tmp_path, clock=lambda: now[0])
-    office.database.migrate()
+    service = Service(tmp_path, clock=lambda: now[0])
+    service.database.migrate()
     now = [30.0]
-    with office.database.writing() as session:
+    with service.database.writing() as session:
         phase, people = furnished(session)
         sent(session, phase, people[0], "x")
         assert queue.take(session, "w", now[0], 60.0) is not None
     now[0] += 1000.0
     for was_away, seconds, left in ((True, 59.0, True), (False, 2.0, False)):
-        housekeeping.end_silent(office, was_away=was_away)
+        housekeeping.end_silent(service, was_away=was_away)
         now[0] += seconds
-        housekeeping.end_silent(office)
-        with office.database.reading() as session:
+        housekeeping.end_silent(service)
+        with service.database.reading() as session:
             assert (session.scalars(select(Chunk.state)).one() == "leased") == left
-    office.close()
+    service.close()
 
 
 def test_no_lease_ends_while_writers_find_the_database_away(tmp_path: Path) -> None:
     """A disk was full between two sweeps: heartbeats failed, but housekeeping, which had nothing to write, did not."""
-    office = Office(tmp_path, clock=lambda: now[0])
-    office.database.migrate()
+    service = Service(tmp_path, clock=lambda: now[0])
+    service.database.migrate()
     now, tries = [30.0], list[int]()
-    with office.database.writing() as session:
+    with service.database.writing() as session:
         phase, people = furnished(session)
         sent(session, phase, people[0], "x")
         assert queue.take(session, "w", now[0], 60.0) is not None
-    keeper = housekeeping.Housekeeper(office)
+    keeper = housekeeping.Housekeeper(service)
     keeper.sweep()
 
     def beat(_session: Session) -> None:
@@ -181,12 +181,12 @@ def test_no_lease_ends_while_writers_find_the_database_away(tmp_path: Path) -> N
     for away, state in ((True, "leased"), (False, "waiting")):
         now[0] += 61.0
         if away:
-            office.database.patiently(beat)
+            service.database.patiently(beat)
         keeper.sweep()
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             assert session.scalars(select(Chunk.state)).one() == state
     assert tries == [0, 1]
-    office.close()
+    service.close()
 
 
 def test_a_chunk_that_kills_its_workers_ends_its_submission_by_our_fault(database: Database) -> None:

@@ -10,15 +10,15 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.service import accounts, housekeeping, standings, viewing
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.tables import Account, Chunk, Competition, Phase, Standing, Submission, Trial
 
 NOW = 5000.0
 
 
 @pytest.fixture
-def office(tmp_path: Path) -> Iterator[Office]:
-    made = Office(tmp_path / "here", tmp_path / "here.key", clock=lambda: NOW)
+def service(tmp_path: Path) -> Iterator[Service]:
+    made = Service(tmp_path / "here", tmp_path / "here.key", clock=lambda: NOW)
     made.database.migrate()
     yield made
     made.close()
@@ -48,8 +48,8 @@ def phase_with(session: Session, *states: str) -> tuple[Phase, list[Submission]]
     return phase, made
 
 
-def test_the_named_submission_counts_else_the_last_valid_one(office: Office) -> None:
-    with office.database.writing() as session:
+def test_the_named_submission_counts_else_the_last_valid_one(service: Service) -> None:
+    with service.database.writing() as session:
         phase, made = phase_with(session, "done", "done", "rejected", "failed", "done", "cancelled")
 
         def counting() -> list[int]:
@@ -64,29 +64,29 @@ def test_the_named_submission_counts_else_the_last_valid_one(office: Office) -> 
         assert counting() == [made[0].id]
 
 
-def test_the_podium_is_run_again_once(office: Office) -> None:
-    with office.database.writing() as session:
+def test_the_podium_is_run_again_once(service: Service) -> None:
+    with service.database.writing() as session:
         phase, made = phase_with(session, "done", "done")
         places = [{"place": 1, "submission": made[0].id}, {"place": 4, "submission": made[1].id}]
         session.add(Standing(phase_id=phase.id, at=1.0, version=0, places=places))
         made[0].state = "running"
     for _ in range(2):
-        housekeeping.check_podiums(office)
-        with office.database.writing() as session:
+        housekeeping.check_podiums(service)
+        with service.database.writing() as session:
             assert session.scalars(select(Chunk)).all() == []
-    with office.database.writing() as session:
+    with service.database.writing() as session:
         session.get_one(Submission, made[0].id).state = "done"
     for _ in range(2):
-        housekeeping.check_podiums(office)
-    with office.database.reading() as session:
+        housekeeping.check_podiums(service)
+    with service.database.reading() as session:
         chunk = session.scalars(select(Chunk)).one()
         assert (chunk.submission_id, chunk.kind, chunk.numbers) == (made[0].id, "again", [0, 1])
 
 
-def test_trials_that_differ_are_named(office: Office) -> None:
-    with office.database.writing() as session:
+def test_trials_that_differ_are_named(service: Service) -> None:
+    with service.database.writing() as session:
         _, (made,) = phase_with(session, "done")
         first, second = session.scalars(select(Trial).order_by(Trial.number)).all()
         first.again, second.again = "f", "g"
         session.flush()
-        assert viewing.differing(office, session, made) == [1]
+        assert viewing.differing(service, session, made) == [1]

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.service.settings import load_settings, own_secret
+from dubins_traffic.service.service import load_settings, own_secret
 from dubins_traffic.service.storage import Storage, StorageError
 
 

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.competition.contents import Bounds
-from dubins_traffic.competition.submission import check_submission
+from dubins_traffic.competition.submission import Bounds, check_submission
 from dubins_traffic.errors import InputError
 
 CONTROLLER = b"class Controller:\n    pass\n"

@@ -18,10 +18,8 @@ from dubins_traffic.campaign.report.statistics import estimate, share
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.suites import gather
-from dubins_traffic.suites.cases import run_cases
-from dubins_traffic.suites.comparing import compare_trials, open_sources
-from dubins_traffic.suites.games import Solver, agrees, check_command, run_games
-from dubins_traffic.suites.run_suite import run_suite
+from dubins_traffic.suites.results import compare_trials, open_sources
+from dubins_traffic.suites.running import Solver, agrees, check_command, run_cases, run_games, run_suite
 from dubins_traffic.suites.suite import Suite, load_suite, shipped_suites
 from dubins_traffic.suites.writing import TABLE, results, write_results
 from tests.suites import cases, document, games

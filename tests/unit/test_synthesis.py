@@ -18,14 +18,11 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.checker import StrategyError, check
-from dubins_traffic.synthesis.counter import Counterstrategy
-from dubins_traffic.synthesis.export import save_game
-from dubins_traffic.synthesis.game import build, estimate
+from dubins_traffic.synthesis.counter import Counterstrategy, story_of
+from dubins_traffic.synthesis.game import build, estimate, save_game
 from dubins_traffic.synthesis.queues import WHO
 from dubins_traffic.synthesis.solver import Solution, solve
-from dubins_traffic.synthesis.story import story_of
-from dubins_traffic.synthesis.strategy import Strategy
+from dubins_traffic.synthesis.strategy import Strategy, StrategyError, check
 from tests.games import ALL, board, pan, solved
 
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"

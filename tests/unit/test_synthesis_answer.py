@@ -20,19 +20,16 @@ from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.files import write_document
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.synthesis.answer import answer
+from dubins_traffic.synthesis.answer import answer, smallest
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.checker import check
-from dubins_traffic.synthesis.counter import Counterstrategy
+from dubins_traffic.synthesis.counter import Counterstrategy, story_of
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import arena_of, cell_of, start_positions
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Solution, solve
-from dubins_traffic.synthesis.story import story_of
-from dubins_traffic.synthesis.strategy import Strategy
-from dubins_traffic.synthesis.strengthening import smallest
+from dubins_traffic.synthesis.strategy import Strategy, check
 from tests.games import ALL, board, pan, solved
 
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"

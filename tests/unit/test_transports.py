@@ -13,8 +13,8 @@ from dubins_traffic.protocols import End
 from dubins_traffic.transports.clocks import Lockstep, RealTime
 from dubins_traffic.transports.inbox import Inbox
 from dubins_traffic.transports.lcm.connection import connect
+from dubins_traffic.transports.link import between, kept, onward
 from dubins_traffic.transports.maestro import Maestro, Mode, Next, Phase
-from dubins_traffic.transports.shown import between, kept, onward
 
 
 def maestro(phase: Phase) -> Maestro:

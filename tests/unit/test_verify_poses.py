@@ -8,7 +8,7 @@ import pytest
 from dubins_traffic.record import schema
 from dubins_traffic.record.reader import from_bytes
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.verification.contacts import from_poses
+from dubins_traffic.verification.worlds import from_poses
 from tests.tampering import Chunks, contact_with, edit, heading, put, rebuilt
 from tests.unit.test_verify import CARS, INSTANCE, Rammer, drop, outcome, renamed_end
 

@@ -16,7 +16,7 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.sandbox.layers import BOX, Layers
 from dubins_traffic.sessions.registry import TRANSPORTS
-from dubins_traffic.suites import run_suite
+from dubins_traffic.suites import running
 from tests.suites import document
 
 
@@ -70,13 +70,13 @@ def test_strangers_controllers_get_boxes() -> None:
         "mine:Mine+shield",
         "own.py:A+sandbox,trust",
     ]
-    specs, notice = run_suite.seated(given)
+    specs, notice = running.seated(given)
     assert specs == [*given[:3], "mine.py:Mine+sandbox", "mine:Mine+sandbox+shield", given[5]]
     assert notice == ""
 
 
 def test_without_boxes_a_line_says_that_they_are_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(run_suite, "available_layers", lambda: Layers(why="no bwrap").without(*BOX))
-    specs, notice = run_suite.seated(["rules", "mine.py:Mine"])
+    monkeypatch.setattr(running, "available_layers", lambda: Layers(why="no bwrap").without(*BOX))
+    specs, notice = running.seated(["rules", "mine.py:Mine"])
     assert specs == ["rules", "mine.py:Mine"]
     assert notice.startswith("mine.py:Mine: in process, trusted, since ")

@@ -24,14 +24,12 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.synthesis.assumption import Assumption, Order
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.counter import Counterstrategy
+from dubins_traffic.synthesis.counter import Counterstrategy, Moment, followed, moment_of, story_of
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import arena_of, assumption_of
 from dubins_traffic.synthesis.queues import Scene
-from dubins_traffic.synthesis.road_play import RoadPlay, Sight
-from dubins_traffic.synthesis.sightings import Sighting
+from dubins_traffic.synthesis.road_play import RoadPlay, Sight, Sighting
 from dubins_traffic.synthesis.solver import solve
-from dubins_traffic.synthesis.story import Moment, followed, moment_of, story_of
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance

@@ -37,9 +37,9 @@ from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import score
 from dubins_traffic.synthesis.answer import answer
 from dubins_traffic.synthesis.assumption import Assumption
-from dubins_traffic.synthesis.export import scene_numbers
+from dubins_traffic.synthesis.game import scene_numbers
 from dubins_traffic.synthesis.strategy import Strategy
-from dubins_traffic.verification.contacts import from_poses
+from dubins_traffic.verification.worlds import from_poses
 
 SECONDS = 0.2
 """Simulated seconds of a moment."""

@@ -20,11 +20,10 @@ from dubins_traffic.protocols import End, Transport
 from dubins_traffic.sessions.plan import rehearse
 from dubins_traffic.sessions.remote import Session, run_remote
 from dubins_traffic.sessions.ros2 import make_transport
-from dubins_traffic.transports.clocks import Lockstep
+from dubins_traffic.transports.clocks import Lockstep, Patience
 from dubins_traffic.transports.inbox import Inbox
 from dubins_traffic.transports.link import EGO_NAME, Link
 from dubins_traffic.transports.maestro import Maestro
-from dubins_traffic.transports.patience import Patience
 
 
 @dataclass(frozen=True, slots=True)

@@ -138,8 +138,7 @@ def report(
     """Compare the controllers of a campaign: a table here, a page with plots and replays, and CSV."""
     from rich.console import Console
 
-    from dubins_traffic.campaign.report.terminal import tables, worst_lines
-    from dubins_traffic.campaign.report.write import write_report
+    from dubins_traffic.campaign.report.write import tables, worst_lines, write_report
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.scoring.notice import assumption_notice
 

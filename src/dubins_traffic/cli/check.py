@@ -34,7 +34,7 @@ def check(
     from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.notice import assumption_notice
     from dubins_traffic.scoring.score import ScoreSheet, score
-    from dubins_traffic.verification.contacts import from_poses
+    from dubins_traffic.verification.worlds import from_poses
 
     read = [(name, from_poses(load_record(name))) for name in records]
     scores = [(name, record.ending, score(record)) for name, record in read]

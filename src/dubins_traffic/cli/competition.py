@@ -140,7 +140,7 @@ def verify(
 ) -> None:
     """Say whether revealed seeds are those that were committed to, for these configurations, limits and ranking."""
     from dubins_traffic.competition import sealing
-    from dubins_traffic.competition.commitment import read_seeds
+    from dubins_traffic.competition.sealing import read_seeds
     from dubins_traffic.files import read_text
 
     own = _phase(file, phase)
@@ -166,7 +166,7 @@ def rank(
     json: options.Json = False,
 ) -> None:
     """Rank entries by their results in the same trials, with intervals, and say which places are ties."""
-    from dubins_traffic.competition.evaluating import load_entries
+    from dubins_traffic.competition.judging import load_entries
     from dubins_traffic.competition.ranking import rank as ranked
     from dubins_traffic.competition.ranking import ranking_document
 

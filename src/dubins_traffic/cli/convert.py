@@ -77,7 +77,7 @@ def convert(
     from dubins_traffic.roads.formats import registry as formats
     from dubins_traffic.roads.network import RoadNetwork
     from dubins_traffic.runs.sources import load
-    from dubins_traffic.simulators.gazebo.export import Version, write_sdf
+    from dubins_traffic.simulators.gazebo.world import Version, write_sdf
 
     if not is_stream(file) and (is_bag(file) or is_log(file)):
         _to_records(file, output, overwrite=overwrite)

@@ -13,7 +13,7 @@ from dubins_traffic.cli import faults, options
 
 if TYPE_CHECKING:
     from dubins_traffic.competition.competition import Competition, Phase
-    from dubins_traffic.competition.evaluating import Evaluation
+    from dubins_traffic.competition.judging import Evaluation
 
 EXAMPLES = options.examples(
     "evaluate controller.py --competition spring",
@@ -76,9 +76,8 @@ def evaluate(
     What is finished is kept; the same command goes on after Ctrl-C.
     """
     from dubins_traffic.cli.progress import progress
-    from dubins_traffic.competition import evaluating
-    from dubins_traffic.competition.contents import EVALUATIONS, check_apart
-    from dubins_traffic.competition.submission import check_submission
+    from dubins_traffic.competition import judging
+    from dubins_traffic.competition.submission import EVALUATIONS, check_apart, check_submission
     from dubins_traffic.competition.visibility import summary
     from dubins_traffic.scoring.notice import fault_notice
 
@@ -89,12 +88,12 @@ def evaluate(
     folder = base if output else base / f"{phase}-{submission.digest[:12]}"
     try:
         with progress() as show:
-            done = evaluating.evaluate(
+            done = judging.evaluate(
                 own, submission, folder, workers=workers, trust=trust, records=records, progress=show
             )
     except KeyboardInterrupt:
         faults.tell(
-            f"interrupted; {evaluating.kept(folder)} of {len(own.numbers)} trials are kept, "
+            f"interrupted; {judging.kept(folder)} of {len(own.numbers)} trials are kept, "
             "the same command goes on"
         )
         raise typer.Exit(faults.FAILED) from None

@@ -52,7 +52,7 @@ def install(prefix: Prefix = None) -> None:
 @app.command("doctor", epilog=DOCTOR_EXAMPLES)
 def doctor(prefix: Prefix = None) -> None:
     """Look whether Gazebo can be used, and say what is missing."""
-    from dubins_traffic.simulators.gazebo.doctor import examine
+    from dubins_traffic.simulators.gazebo.install import examine
     from dubins_traffic.simulators.gazebo.prefix import place
 
     well = True

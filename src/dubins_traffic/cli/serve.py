@@ -65,20 +65,20 @@ def serve(
 
     with needs("serving competitions", "service"):
         from dubins_traffic.service import logs, serving
-        from dubins_traffic.service.office import Office, default_key
+        from dubins_traffic.service.service import Service, default_key
         from dubins_traffic.service.worker import check_boxes
     logs.to_stderr()
     if workers:
         check_boxes(trust=trust)
     place = Path(folder)
-    office = Office(place, default_key(place) if key_file is None else Path(key_file))
+    service = Service(place, default_key(place) if key_file is None else Path(key_file))
     opened = serving.listen(serving.Place(host, port))
     url = serving.address_of(opened)
-    joining = serving.prepare(office, [Path(path) for path in competition or ()], url)
-    print(f"Serving {folder} at {office.settings.url or url}", flush=True)
-    if office.settings.url:
+    joining = serving.prepare(service, [Path(path) for path in competition or ()], url)
+    print(f"Serving {folder} at {service.settings.url or url}", flush=True)
+    if service.settings.url:
         print(f"The proxy finds it at {url}", flush=True)
     if joining is not None:
         print(f"The first organiser joins at {joining}", flush=True)
     worker = (sys.executable, "-m", "dubins_traffic.cli", "worker")
-    serving.serve(office, opened, workers, worker, trust=trust)
+    serving.serve(service, opened, workers, worker, trust=trust)

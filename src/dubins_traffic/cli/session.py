@@ -92,7 +92,7 @@ class SessionOptions:
     def pace(self) -> Pace:
         """Return the pace of the session: its clock, and how long drivers are waited for."""
         from dubins_traffic.sessions.plan import Pace
-        from dubins_traffic.transports.patience import Patience
+        from dubins_traffic.transports.clocks import Patience
 
         patience = Patience(begin=self.begin, silence=self.silence)
         return Pace(self.lockstep, self.factor, self.deadline, patience)

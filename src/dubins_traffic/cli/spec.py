@@ -129,7 +129,7 @@ def _part(whole: Specification, assumption: bool | None) -> Specification:
 
 def _in_our_syntax(spec: Specification, joint: str) -> str:
     """Return a specification in the syntax that we read ourselves, its conjuncts joined by `joint`."""
-    from dubins_traffic.logic.printer import to_spin
+    from dubins_traffic.logic.formula import to_spin
 
     sides = [
         joint.join(f"({to_spin(formula)})" for formula in formulas).replace("[] <>", "[]<>")
@@ -181,7 +181,7 @@ def _refusal(
     error: FormulaError, whole: FormulaError, formula: Formula, format: Format, source: str
 ) -> InputError:
     """Return what to say of a formula that can't be said, given what would have to change for the whole."""
-    from dubins_traffic.logic.printer import to_spin
+    from dubins_traffic.logic.formula import to_spin
 
     return InputError(
         error.problem,

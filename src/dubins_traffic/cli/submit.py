@@ -43,7 +43,7 @@ def submit(
 ) -> None:
     """Hand in a submission; the same again is the same submission, and costs nothing."""
     from dubins_traffic.service import client
-    from dubins_traffic.service.connection import token_from
+    from dubins_traffic.service.client import token_from
 
     token = token_from(token_file)
     url, told = client.submit(to, Path(path), token)
@@ -54,7 +54,7 @@ def submit(
 def status(url: Address, token_file: TokenFile = None, json: options.Json = False) -> None:
     """Say where a submission is: its state and why, its place in the queue, its scores as far as they may be seen."""
     from dubins_traffic.service import client
-    from dubins_traffic.service.connection import token_from
+    from dubins_traffic.service.client import token_from
 
     _show(client.status(url, token_from(token_file)), json=json)
 
@@ -63,7 +63,7 @@ def logs(url: Address, token_file: TokenFile = None, json: options.Json = False)
     """Print what a submission has printed, as far as it may be seen."""
     from dubins_traffic.errors import shown
     from dubins_traffic.service import client
-    from dubins_traffic.service.connection import token_from
+    from dubins_traffic.service.client import token_from
 
     told = client.logs(url, token_from(token_file))
     if json:
@@ -79,7 +79,7 @@ def logs(url: Address, token_file: TokenFile = None, json: options.Json = False)
 def cancel(url: Address, token_file: TokenFile = None, json: options.Json = False) -> None:
     """Cancel a submission that has not ended."""
     from dubins_traffic.service import client
-    from dubins_traffic.service.connection import token_from
+    from dubins_traffic.service.client import token_from
 
     _show(client.cancel(url, token_from(token_file)), json=json)
 

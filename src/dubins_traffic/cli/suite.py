@@ -151,9 +151,9 @@ def run(
 ) -> None:
     """Run a suite, or what is left of it; write a file of results to send, and a page. What is finished is kept."""
     from dubins_traffic.campaign import table
-    from dubins_traffic.suites import cases
-    from dubins_traffic.suites.comparing import open_sources
-    from dubins_traffic.suites.run_suite import seated
+    from dubins_traffic.suites import running
+    from dubins_traffic.suites.results import open_sources
+    from dubins_traffic.suites.running import seated
     from dubins_traffic.suites.suite import load_suite
     from dubins_traffic.suites.writing import PAGE, write_results
 
@@ -174,7 +174,7 @@ def run(
     print(write_results(found, open_sources([str(path)]), report, overwrite=True), end="")
     options.tell(str(path), str(report / PAGE))
     if found.model.cases is not None:
-        faults.fail_if(cases.faulty(Path(folder), found))
+        faults.fail_if(running.faulty(Path(folder), found))
     elif found.model.campaign is not None:
         faults.fail_if(table.faulty(Path(folder)))
 
@@ -209,7 +209,7 @@ def _trials(
     from dubins_traffic.campaign.folder import kept
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.scoring.long_enough import short_notice
-    from dubins_traffic.suites.run_suite import run_suite
+    from dubins_traffic.suites.running import run_suite
 
     faults.warn(short_notice(found.campaign(["simple"]).first_trials()))
     try:
@@ -226,7 +226,7 @@ def _cases(found: Suite, folder: Path, controllers: list[str], workers: int | No
     import os
 
     from dubins_traffic.cli.progress import progress
-    from dubins_traffic.suites.cases import run_cases
+    from dubins_traffic.suites.running import run_cases
 
     if not controllers:
         raise InputError("missing", file="--controller", expected="who drives in the cases")
@@ -241,7 +241,7 @@ def _cases(found: Suite, folder: Path, controllers: list[str], workers: int | No
 
 def _games(found: Suite, folder: Path, solver: str | None, seconds: float, *, resume: bool) -> Path:
     from dubins_traffic.cli.progress import progress
-    from dubins_traffic.suites.games import Solver, check_command, run_games
+    from dubins_traffic.suites.running import Solver, check_command, run_games
 
     if solver is not None:
         check_command(solver)
@@ -275,7 +275,7 @@ def compare(
     ] = None,
 ) -> None:
     """Compare results of one suite: a table here, and a page. Results of different hashes are refused."""
-    from dubins_traffic.suites.comparing import made_by, open_sources
+    from dubins_traffic.suites.results import made_by, open_sources
     from dubins_traffic.suites.suite import load_suite, shipped_suites
     from dubins_traffic.suites.writing import PAGE, TABLE, results, write_results
 

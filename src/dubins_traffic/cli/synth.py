@@ -108,11 +108,10 @@ def synth(
     """
     from dubins_traffic.files import write_text
     from dubins_traffic.synthesis.answer import answer
-    from dubins_traffic.synthesis.checker import check
-    from dubins_traffic.synthesis.export import save_game
+    from dubins_traffic.synthesis.game import save_game
     from dubins_traffic.synthesis.instance import start_cells
     from dubins_traffic.synthesis.specification import specification_text
-    from dubins_traffic.synthesis.strategy import Strategy
+    from dubins_traffic.synthesis.strategy import Strategy, check
 
     _check_outputs(source, strategy, graph, spec, overwrite=overwrite)
     instance = _instance(source, seed, trial)

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.reader import Record
-    from dubins_traffic.verification.sheet import Scores
+    from dubins_traffic.verification.verify import Scores
 
 EXAMPLES = options.examples(
     "verify out/*.mcap",
@@ -86,7 +86,7 @@ def verify(
     Trials of our simulator are run again from instance and recorded commands, and all is compared bit for bit. Exit
     status: 0 if all are verified, 1 if one differs, 2 if one can't be read.
     """
-    from dubins_traffic.verification.sheet import read_sheet
+    from dubins_traffic.verification.verify import read_sheet
 
     expected = _expected(instance, configuration, rnd, seed, trial, simulator)
     printed = None if scores is None else read_sheet(scores)

@@ -82,7 +82,7 @@ def worker(
     with needs("a worker", "service"):
         from dubins_traffic.service import logs
         from dubins_traffic.service import worker as room
-        from dubins_traffic.service.connection import Connection, token_from
+        from dubins_traffic.service.client import Connection, token_from
     logs.to_stderr()
     called, token = name or socket.gethostname()[:60], token_from(token_file)
     if ray is not None:

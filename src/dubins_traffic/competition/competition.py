@@ -387,10 +387,7 @@ class Competition:
     def phase(self, name: str) -> Phase:
         """Return the phase called `name`.
 
-        Raises
-        ------
-        InputError
-            If there is none, or it names a configuration that there is not.
+        InputError if there is none, or it names a configuration that there is not.
         """
         model = self.model.phases.get(name)
         if model is None:
@@ -412,10 +409,7 @@ class Competition:
 def load_competition(path: str | os.PathLike[str]) -> Competition:
     """Return the competition in the TOML file at `path`; of a folder, in its `competition.toml`.
 
-    Raises
-    ------
-    InputError
-        If there is no such file or something in it is wrong.
+    InputError if there is no such file or something in it is wrong.
     """
     place = Path(path) / FILE if Path(path).is_dir() else Path(path)
     document = read_toml(place, "a competition file, TOML")

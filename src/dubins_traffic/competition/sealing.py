@@ -3,6 +3,9 @@
 In the folder of a competition ``sealed/PHASE.json`` holds the seeds encrypted (AES-256-GCM; the key is derived by
 scrypt from a passphrase or the contents of a key file, which lies elsewhere), ``published/PHASE.commitment.json`` what
 is published when the phase opens, and ``published/PHASE.seeds.txt`` what is revealed after it has closed.
+
+The text whose SHA-256 is the commitment is what it says, so that `sha256sum` alone checks it: a heading, the phase,
+the digest of its rules, a salt, and the seed of each trial on a line of its own.
 """
 
 from __future__ import annotations
@@ -12,19 +15,149 @@ import contextlib
 import hashlib
 import json
 import os
+import re
 import secrets
 from collections.abc import Mapping
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import Field
 
-from dubins_traffic.competition.commitment import Seeded, Seeds, check_belong, read_seeds
 from dubins_traffic.errors import InputError, MissingExtraError
 from dubins_traffic.files import is_file, read_text, replace_file
+from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, parse
 from dubins_traffic.problem.files import dumps, parse_json
+from dubins_traffic.problem.instance import Instance
+
+HEADING = "dubins-traffic seeds 1"
+_SALT = re.compile(r"[0-9a-f]{64}")
+_DIGEST = re.compile(r"[0-9a-f]{64}")
+_SEED = re.compile(r"0|[1-9][0-9]{0,19}")
+
+
+class Seeded(Protocol):
+    """A phase, as far as its seeds go (`competition.Phase`)."""
+
+    @property
+    def name(self) -> str:
+        """Such as ``test``."""
+        ...
+
+    @property
+    def rules(self) -> str:
+        """SHA-256 of all that decides a trial and its rank, but for the seeds."""
+        ...
+
+    @property
+    def numbers(self) -> range:
+        """The numbers of its trials."""
+        ...
+
+    @property
+    def folder(self) -> Path | None:
+        """Where sealed and revealed seeds lie."""
+        ...
+
+    @property
+    def secret(self) -> bool:
+        """Whether its seeds are secret until it has closed."""
+        ...
+
+    @property
+    def closes(self) -> datetime | None:
+        """When it is over."""
+        ...
+
+    def instance(self, number: int, seed: int) -> Instance:
+        """Return what a trial is drawn to be from its seed; InputError if it can't be drawn."""
+        ...
+
+    def is_closed(self, now: datetime | None = None) -> bool:
+        """Tell whether it is over."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Seeds:
+    """The seeds of a phase with what hides them until they are revealed.
+
+    Attributes
+    ----------
+    phase : str
+        Its name.
+    rules : str
+        `Phase.rules` when the seeds were drawn.
+    salt : str
+        32 random bytes as hexadecimal digits: nobody can try seeds against the commitment.
+    seeds : tuple of int
+        One a trial, in the order of their numbers.
+    """
+
+    phase: str
+    rules: str
+    salt: str
+    seeds: tuple[int, ...]
+
+    @property
+    def text(self) -> str:
+        """The text that is committed to, and later revealed."""
+        head = [HEADING, f"phase {self.phase}", f"rules {self.rules}", f"salt {self.salt}"]
+        return "\n".join([*head, *map(str, self.seeds), ""])
+
+    @property
+    def commitment(self) -> str:
+        """SHA-256 of the text, as hexadecimal digits."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
+
+
+def read_seeds(text: str, file: str | None = None) -> Seeds:
+    """Return the seeds that a revealed text says; InputError if it is no such text, to the byte."""
+    lines = text.split("\n")
+    expected = f"{HEADING}, phase, rules, salt, and a seed a line"
+    if len(lines) < 6 or lines[0] != HEADING or lines[-1]:
+        raise InputError("not revealed seeds", file=file, expected=expected)
+    pairs = [line.partition(" ") for line in lines[1:4]]
+    found = {name: value for name, _, value in pairs}
+    if list(found) != ["phase", "rules", "salt"]:
+        raise InputError("not revealed seeds", file=file, value=lines[1:4], expected=expected)
+    for name, rule in (("rules", _DIGEST), ("salt", _SALT)):
+        if not rule.fullmatch(found[name]):
+            raise InputError(
+                "wrong value", file=file, field=name, value=found[name], expected="64 hexadecimal digits"
+            )
+    for k, line in enumerate(lines[4:-1]):
+        if not _SEED.fullmatch(line) or int(line) >= limits.SEEDS:
+            raise InputError(
+                "not a seed", file=file, field=f"line {k + 5}", value=line, expected="an integer below 2**64"
+            )
+    return Seeds(found["phase"], found["rules"], found["salt"], tuple(map(int, lines[4:-1])))
+
+
+def check_belong(seeds: Seeds, phase: Seeded, file: str | None = None) -> None:
+    """Refuse seeds that are of another phase, or of one whose rules were others; InputError if they are."""
+    if seeds.phase != phase.name:
+        raise InputError(
+            "seeds of another phase", file=file, field="phase", value=seeds.phase, expected=phase.name
+        )
+    if seeds.rules != phase.rules:
+        raise InputError(
+            "the seeds were drawn for other configurations, trials, limits or another ranking",
+            file=file,
+            field="rules",
+            value=seeds.rules,
+            expected=phase.rules,
+        )
+    if len(seeds.seeds) != len(phase.numbers):
+        raise InputError(
+            "not a seed for each trial",
+            file=file,
+            value=len(seeds.seeds),
+            expected=f"{len(phase.numbers)} seeds",
+        )
+
 
 SHORTEST_KEY = 12
 """Fewest bytes of a passphrase or a key file."""
@@ -80,10 +213,7 @@ def revealed_path(phase: Seeded) -> Path:
 def draw_seeds(phase: Seeded) -> Seeds:
     """Return new seeds for a phase, from the system's source of secrets, from which all its trials can be drawn.
 
-    Raises
-    ------
-    InputError
-        If a trial can't be drawn from any of `MOST_DRAWS` seeds.
+    InputError if a trial can't be drawn from any of `MOST_DRAWS` seeds.
     """
     seeds = tuple(_drawable(phase, number) for number in phase.numbers)
     return Seeds(phase.name, phase.rules, secrets.token_hex(32), seeds)
@@ -203,10 +333,7 @@ def publish(phase: Seeded, title: str, now: datetime | None = None) -> Published
 def reveal(phase: Seeded, key: bytes, now: datetime | None = None) -> Path:
     """Write the seeds of a phase that has closed for everybody to see; return where.
 
-    Raises
-    ------
-    InputError
-        If the phase is not over, its commitment was never published or is another, or the key is wrong.
+    InputError if the phase is not over, its commitment was never published or is another, or the key is wrong.
     """
     _check_secret(phase)
     if not phase.is_closed(now):
@@ -225,13 +352,7 @@ def reveal(phase: Seeded, key: bytes, now: datetime | None = None) -> Path:
 
 
 def check_revealed(seeds: Seeds, phase: Seeded, commitment: str) -> None:
-    """Refuse seeds that are not those of a phase that were committed to.
-
-    Raises
-    ------
-    InputError
-        If they are not.
-    """
+    """Refuse seeds that are not those of a phase that were committed to; InputError if they are not."""
     check_belong(seeds, phase)
     if seeds.commitment != commitment:
         raise InputError(
@@ -245,10 +366,7 @@ def check_revealed(seeds: Seeds, phase: Seeded, commitment: str) -> None:
 def secret_seeds(phase: Seeded, key: bytes | None) -> tuple[int, ...]:
     """Return the seeds of a phase that has secret ones: the revealed ones, else those that `key` decrypts.
 
-    Raises
-    ------
-    InputError
-        If they are still secret and the key is missing or wrong.
+    InputError if they are still secret and the key is missing or wrong.
     """
     if phase.folder is not None and is_file(revealed_path(phase)):
         path = revealed_path(phase)
@@ -360,10 +478,7 @@ def make_key_file(path: Path, folder: Path | None) -> None:
 def read_key(path: Path, folder: Path | None) -> bytes:
     """Return what is in a key file.
 
-    Raises
-    ------
-    InputError
-        If it can't be read, or lies in the folder of the competition: who copies that would have both.
+    InputError if it can't be read, or lies in the folder of the competition: who copies that would have both.
     """
     _check_outside(path, folder)
     return read_text(path).strip().encode()

@@ -17,10 +17,7 @@ _SUFFIX = ".txt"
 def template_files(kind: str) -> dict[str, str]:
     """Return the files of a template by name; `kind` is ``competition``, ``python`` or ``cpp``.
 
-    Raises
-    ------
-    InputError
-        If there is none of that kind.
+    InputError if there is none of that kind.
     """
     folder = files("dubins_traffic.competition") / "templates" / kind
     if not folder.is_dir():
@@ -31,10 +28,7 @@ def template_files(kind: str) -> dict[str, str]:
 def write_template(kind: str, folder: Path) -> list[Path]:
     """Write the files of a template into a new or empty folder and return their paths.
 
-    Raises
-    ------
-    InputError
-        If there is no such template, the folder holds something, or it can't be written.
+    InputError if there is no such template, the folder holds something, or it can't be written.
     """
     found = template_files(kind)
     try:

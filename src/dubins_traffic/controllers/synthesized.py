@@ -21,19 +21,16 @@ from dubins_traffic.record.sink import BY_RULES, BY_STRATEGY, DECIDED, SHIELD
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.shield.filter import ShieldFilter
-from dubins_traffic.synthesis.advice import Advice, Adviser, Ranked
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.foreign.adviser import MachineAdviser
-from dubins_traffic.synthesis.foreign.labelled import misfit
+from dubins_traffic.synthesis.foreign.adviser import MachineAdviser, misfit
 from dubins_traffic.synthesis.foreign.machine import Machine
 from dubins_traffic.synthesis.foreign.read import read_machine
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import arena_of, assumption_of
-from dubins_traffic.synthesis.road_play import RoadPlay, Sight
-from dubins_traffic.synthesis.sightings import Sighting
+from dubins_traffic.synthesis.road_play import RoadPlay, Sight, Sighting
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.specification import inputs_of, outputs_of
-from dubins_traffic.synthesis.strategy import Strategy
+from dubins_traffic.synthesis.strategy import Advice, Adviser, Ranked, Strategy
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem

@@ -17,7 +17,7 @@ from dubins_traffic.record.wall import remove_record
 from dubins_traffic.sessions.plan import Pace, SessionPlan
 from dubins_traffic.sessions.registry import TRANSPORTS
 from dubins_traffic.sessions.remote import quiet
-from dubins_traffic.transports.patience import Patience
+from dubins_traffic.transports.clocks import Patience
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance

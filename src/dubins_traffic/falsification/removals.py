@@ -10,7 +10,7 @@ from dubins_traffic.agents import choices, whims
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.falsification.sampling import CHOSEN
-from dubins_traffic.logic.temporal import ticks
+from dubins_traffic.logic.formula import ticks
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import FREE, KINDS, parameters_of
 from dubins_traffic.problem.parts import Disturbances

@@ -11,17 +11,294 @@ depend on the value of a clock, and the formula is refused in this form.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Final, TypeAlias
 
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.logic.emptiness import MAX_STATES as MAX_SOUGHT
-from dubins_traffic.logic.emptiness import Emptiness
 from dubins_traffic.logic.formula import FUTURE, Formula, FormulaError, Op, subformulas
-from dubins_traffic.logic.moves import STRONG, Stepper
-from dubins_traffic.logic.obligations import DONE, Atom, Moves, Table
+from dubins_traffic.logic.obligations import DONE, NOTHING, Atom, Letter, Moves, Node, Table
+
+MAX_MOVES: Final = 400
+"""Most alternatives that one step may leave open."""
+
+MAX_WORK: Final = 1_500_000
+"""Most comparisons of alternatives while one table is worked out: some seconds."""
+
+STRONG: Final = 1
+PUT_OFF: Final = 2
+
+
+class Stepper:
+    """Steps the obligations of one table; remembers what it has worked out."""
+
+    def __init__(self, table: Table) -> None:
+        self.table = table
+        self.work = 0
+        self._steps: dict[tuple[int, Letter], Moves] = {}
+        self._implied: dict[tuple[Atom, Atom], bool] = {}
+
+    def step(self, number: int, letter: Letter) -> Moves:
+        """Return what is left of obligation `number` after `letter`."""
+        key = number, letter
+        found = self._steps.get(key)
+        if found is None:
+            found = self._steps[key] = self._step(self.table.nodes[number], number, letter)
+        return found
+
+    def step_all(self, numbers: Iterable[int], letter: Letter) -> Moves:
+        """Return what is left of several obligations after `letter`."""
+        moves = DONE
+        for number in numbers:
+            moves = self.both(moves, self.step(number, letter))
+            if not moves:
+                break
+        return moves
+
+    def both(self, one: Moves, other: Moves) -> Moves:
+        """Return the conjunction of two disjunctions."""
+        if one == DONE:
+            return other
+        if other == DONE:
+            return one
+        return self.smallest(self.conjunction(a | b) for a in one for b in other)
+
+    def either(self, one: Moves, other: Moves) -> Moves:
+        """Return the disjunction of two disjunctions."""
+        return self.smallest([*one, *other]) if one and other else one or other
+
+    def conjunction(self, atoms: frozenset[Atom]) -> frozenset[Atom]:
+        """Return `atoms` without those that others imply."""
+        if len(atoms) < 2:
+            return atoms
+        return frozenset(
+            atom for atom in atoms if not any(other != atom and self.implies(other, atom) for other in atoms)
+        )
+
+    def smallest(self, moves: Iterable[frozenset[Atom]]) -> Moves:
+        """Return `moves` without those that imply another.
+
+        Raises
+        ------
+        FormulaError
+            If too many are left.
+        """
+        kept: list[frozenset[Atom]] = []
+        for move in sorted(set(moves), key=len):
+            self.work += 1 + len(kept)
+            if not any(self._covers(other, move) for other in kept):
+                kept = [other for other in kept if not self._covers(move, other)]
+                kept.append(move)
+        if len(kept) > MAX_MOVES or self.work > MAX_WORK:
+            raise FormulaError(
+                "too large to be monitored",
+                expected=f"at most {MAX_MOVES} open alternatives, and {MAX_WORK} steps to work out the table",
+            )
+        return frozenset(kept)
+
+    def _covers(self, weak: frozenset[Atom], strong: frozenset[Atom]) -> bool:
+        return all(atom in strong or any(self.implies(other, atom) for other in strong) for atom in weak)
+
+    def implies(self, one: Atom, other: Atom) -> bool:
+        """Say whether one obligation contains another, as far as their form shows it."""
+        key = one, other
+        found = self._implied.get(key)
+        if found is None:
+            found = self._implied[key] = self._implies(one, other)
+        return found
+
+    def _implies(self, one: Atom, other: Atom) -> bool:
+        if one >> 2 == other >> 2:
+            return (one & 3) | (other & 3) == one & 3
+        if (one & STRONG) < (other & STRONG):
+            return False
+        a, b = self.table.nodes[one >> 2], self.table.nodes[other >> 2]
+        if a.kind != b.kind or a.parts != b.parts or a.kind not in ("until", "release"):
+            return False
+        shorter, longer = (a, b) if a.kind == "until" else (b, a)
+        return _at_most(shorter, longer)
+
+    def _step(self, node: Node, number: int, letter: Letter) -> Moves:
+        if node.kind == "true":
+            return DONE
+        if node.kind == "false":
+            return NOTHING
+        if node.kind in ("test", "past"):
+            values = letter.tests if node.kind == "test" else letter.past
+            return DONE if values[node.first] == node.strong else NOTHING
+        if node.kind == "and":
+            return self.step_all(node.parts, letter)
+        if node.kind == "or":
+            moves = NOTHING
+            for part in node.parts:
+                moves = self.either(moves, self.step(part, letter))
+            return moves
+        if node.kind == "next":
+            return self._step_next(node, letter)
+        return self._step_fixpoint(node, number, letter)
+
+    def _step_next(self, node: Node, letter: Letter) -> Moves:
+        if node.clock >= 0:
+            if node.running and letter.expired >> node.clock & 1:
+                return self.step(node.parts[0], letter)
+            rest = self.table.node(node._replace(running=2 if node.running else 1))
+        else:
+            rest = (
+                node.parts[0] if node.length == 1 else self.table.node(node._replace(length=node.length - 1))
+            )
+        return frozenset([frozenset([rest << 2 | (STRONG if node.strong else 0)])])
+
+    def _step_fixpoint(self, node: Node, number: int, letter: Letter) -> Moves:
+        left, right = (self.step(part, letter) for part in node.parts)
+        flags = STRONG if node.kind == "until" else 0
+        if node.clock >= 0:
+            if node.running and letter.expired >> node.clock & 1:
+                return right
+            rest = self.table.node(node._replace(running=2 if node.running else 1))
+        elif node.length > 0:
+            rest = (
+                node.parts[1] if node.length == 1 else self.table.node(node._replace(length=node.length - 1))
+            )
+        else:
+            rest = number
+            flags |= PUT_OFF if node.kind == "until" else 0
+        waiting: Moves = frozenset([frozenset([rest << 2 | flags])])
+        if node.kind == "until":
+            return self.either(right, self.both(left, waiting))
+        return self.both(right, self.either(left, waiting))
+
+
+def _at_most(shorter: Node, longer: Node) -> bool:
+    """Say whether the first of two bounded fixpoints over the same parts certainly ends no later."""
+    if longer.clock < 0 and longer.length < 0:
+        return True
+    if shorter.clock >= 0 and shorter.clock == longer.clock:
+        return shorter.running >= longer.running
+    return shorter.clock < 0 and longer.clock < 0 and 0 <= shorter.length <= longer.length
+
+
+MAX_SOUGHT: Final = 20_000
+"""Most states of the Büchi automaton of one part."""
+
+SoughtState: TypeAlias = tuple[tuple[bool, ...], frozenset[int]]
+Edge: TypeAlias = tuple[SoughtState, frozenset[int]]
+
+
+class Emptiness:
+    """Answers whether obligations can be met, for obligations without clocks; `most` states are looked at.
+
+    It asks the Büchi automaton that the tableau is. A state is the memory of the past operators and a set of
+    obligations. An infinite run is accepting if it puts off no until for ever; there is one from a state if it
+    reaches a strongly connected component whose edges do not all put off the same until (Couvreur, 1999).
+    """
+
+    def __init__(self, stepper: Stepper, outcomes: list[tuple[bool, ...]], most: int = MAX_SOUGHT) -> None:
+        self._most = most
+        self._stepper = stepper
+        self._outcomes = outcomes
+        self._meetable: dict[SoughtState, bool] = {}
+
+    def meetable(self, memory: tuple[bool, ...], numbers: frozenset[int]) -> bool:
+        """Say whether some infinite word meets all obligations in `numbers`.
+
+        FormulaError if the automaton grows too large.
+        """
+        state = memory, numbers
+        if not numbers:
+            return True
+        if state not in self._meetable:
+            if self._steadily(memory, numbers):
+                self._meetable[state] = True
+            else:
+                self._search(state)
+        return self._meetable[state]
+
+    def _steadily(self, memory: tuple[bool, ...], numbers: frozenset[int]) -> bool:
+        """Say whether one letter for ever meets the obligations; only asked where it leaves the memory as it is."""
+        for tests in self._outcomes:
+            letter, after = self._stepper.table.letter(tests, memory)
+            if after == memory:
+                known: dict[int, bool] = {}
+                if all(self._steady(number, letter, known) for number in numbers):
+                    return True
+        return False
+
+    def _steady(self, number: int, letter: Letter, known: dict[int, bool]) -> bool:
+        """Return the value of an obligation on the word that repeats one letter."""
+        found = known.get(number)
+        if found is None:
+            node = self._stepper.table.nodes[number]
+            if node.kind in ("test", "past"):
+                values = letter.tests if node.kind == "test" else letter.past
+                found = values[node.first] == node.strong
+            elif node.kind in ("and", "or"):
+                parts = (self._steady(part, letter, known) for part in node.parts)
+                found = all(parts) if node.kind == "and" else any(parts)
+            else:
+                found = self._steady(node.parts[-1], letter, known) if node.parts else node.kind == "true"
+            known[number] = found
+        return found
+
+    def _edges(self, state: SoughtState) -> list[Edge]:
+        memory, numbers = state
+        found: dict[Edge, None] = {}
+        table = self._stepper.table
+        for tests in self._outcomes:
+            letter, after = table.letter(tests, memory)
+            for move in self._stepper.step_all(sorted(numbers), letter):
+                put_off = frozenset(atom >> 2 for atom in move if atom & PUT_OFF)
+                found[(after, frozenset(atom >> 2 for atom in move)), put_off] = None
+        return list(found)
+
+    def _search(self, start: SoughtState) -> None:
+        """Tarjan's algorithm from `start`, without recursion; settles every state that it meets."""
+        index: dict[SoughtState, int] = {start: 0}
+        low: dict[SoughtState, int] = {start: 0}
+        edges: dict[SoughtState, list[Edge]] = {start: self._edges(start)}
+        path = [(start, iter(edges[start]))]
+        stack = [start]
+        while path:
+            state, rest = path[-1]
+            for target, _ in rest:
+                if target in self._meetable:
+                    continue
+                if target in index:
+                    low[state] = min(low[state], index[target])
+                    continue
+                if len(self._meetable) + len(index) > self._most:
+                    raise FormulaError(
+                        "too large to be monitored", expected=f"at most {self._most} states of its automaton"
+                    )
+                index[target] = low[target] = len(index)
+                edges[target] = self._edges(target)
+                stack.append(target)
+                path.append((target, iter(edges[target])))
+                break
+            else:
+                path.pop()
+                if path:
+                    low[path[-1][0]] = min(low[path[-1][0]], low[state])
+                if low[state] == index[state]:
+                    place = stack.index(state)
+                    self._settle(stack[place:], edges)
+                    del stack[place:]
+
+    def _settle(self, component: list[SoughtState], edges: dict[SoughtState, list[Edge]]) -> None:
+        members = set(component)
+        always: frozenset[int] | None = None
+        meetable = False
+        for state in component:
+            for target, put_off in edges[state]:
+                if target in members:
+                    always = put_off if always is None else always & put_off
+                elif self._meetable[target] or not target[1]:
+                    meetable = True
+        meetable = meetable or (always is not None and not always)
+        for state in component:
+            self._meetable[state] = meetable
+
 
 MAX_STATES: Final = 2048
 """Most states of one table before it is made smaller."""

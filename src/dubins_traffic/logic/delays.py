@@ -17,6 +17,7 @@ from dubins_traffic.logic.formula import (
     FUTURE,
     Formula,
     Op,
+    always,
     disj,
     implies,
     make,
@@ -24,9 +25,9 @@ from dubins_traffic.logic.formula import (
     prop,
     propositions,
     subformulas,
+    ticks,
 )
 from dubins_traffic.logic.obligations import Table
-from dubins_traffic.logic.temporal import always, ticks
 
 
 @dataclass(frozen=True)

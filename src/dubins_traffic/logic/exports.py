@@ -1,7 +1,7 @@
 """The task in the languages of other tools, as text.
 
 All take a `Specification`: the assumptions about the environment imply the guarantees of the system. Past operators
-become memory that the environment keeps (`translation.Memory`) where the tool has none: inputs whose first value and
+become memory that the environment keeps (`rewrite.Memory`) where the tool has none: inputs whose first value and
 every step the assumptions fix. Bounds become ticks of the given period except in STL and LaTeX.
 """
 
@@ -14,28 +14,31 @@ from typing import Final
 from dubins_traffic.logic.formula import (
     FUTURE,
     PAST,
+    SPIN,
     Bounds,
     Brackets,
     Formula,
     FormulaError,
     Op,
     Style,
+    always,
     conj,
     implies,
     make,
     number,
     propositions,
     subformulas,
+    ticks,
     written,
+    written_implication,
+    written_together,
 )
 from dubins_traffic.logic.gr1 import gr1, slugs_text, tulip_text
-from dubins_traffic.logic.printer import SPIN, written_implication, written_together
-from dubins_traffic.logic.rewrite import mapped
-from dubins_traffic.logic.temporal import always, ticks
-from dubins_traffic.logic.translation import (
+from dubins_traffic.logic.rewrite import (
     MAX_NEXT,
     for_signals,
     in_ticks,
+    mapped,
     until_and_release_only,
     without_past,
     written_out,
@@ -149,10 +152,7 @@ _SPOT: Final = Style({Op.AND: "&", Op.OR: "|", Op.TRUE: "1", Op.FALSE: "0"}, bou
 def spot(spec: Specification, period: float) -> str:
     """Return one formula as Spot reads it; bounds in ticks, long ones in parts: ``F[0:46] F[0:254] p``.
 
-    Raises
-    ------
-    FormulaError
-        If a bound is too long for that; says which period would do.
+    FormulaError if a bound is too long for that; says which period would do.
     """
     _check_longest(spec, period, _SPOT_PARTS * int(_SPOT_COUNTS), "for Spot")
     plain = _changed(_without_past(spec), lambda formula: in_ticks(formula, period))
@@ -268,10 +268,7 @@ def _quoted(text: str) -> str:
 def slugs(spec: Specification, period: float) -> str:
     """Return a document in slugs' structured form.
 
-    Raises
-    ------
-    FormulaError
-        If a part is outside of what GR(1) can say (`gr1.gr1`).
+    FormulaError if a part is outside of what GR(1) can say (`gr1.gr1`).
     """
     return slugs_text(gr1(spec.assumptions, spec.guarantees, spec.inputs, spec.outputs, period))
 
@@ -279,10 +276,7 @@ def slugs(spec: Specification, period: float) -> str:
 def tulip(spec: Specification, period: float) -> str:
     """Return a Python file that makes TuLiP's GR(1) specification.
 
-    Raises
-    ------
-    FormulaError
-        If a part is outside of what GR(1) can say (`gr1.gr1`).
+    FormulaError if a part is outside of what GR(1) can say (`gr1.gr1`).
     """
     return tulip_text(gr1(spec.assumptions, spec.guarantees, spec.inputs, spec.outputs, period))
 

@@ -1,12 +1,36 @@
 """Formulas of linear temporal logic with past and bounded operators, over named propositions.
 
 Formulas are immutable and shared: equal formulas are one object, so `==` and `hash` cost nothing. Conjunctions and
-disjunctions have any number of parts and never stand directly inside one of their own kind. What each temporal
-operator means stands in `dubins_traffic.logic.temporal`. A formula is printed in letters: ``G (a -> F b)``.
+disjunctions have any number of parts and never stand directly inside one of their own kind. A formula is printed in
+letters: ``G (a -> F b)``.
+
+========  =====================  =================================================================
+letter    function               meaning at position t of an infinite word
+========  =====================  =================================================================
+``X``     `next_`                p holds at t + 1
+``F``     `eventually`           p holds now or later; with bounds [a, b], within them
+``G``     `always`               p holds from now on; with bounds [a, b], at all positions in them
+``U``     `until`                q holds now or later (within the bounds), and p until then
+``R, V``  `release`              not (not p U not q)
+``W``     `weak_until`           p U q, or p for ever
+``M``     `strong_release`       q U (p and q)
+``Y``     `yesterday`            t > 0, and p held at t - 1
+``Z``     `weak_yesterday`       t = 0, or p held at t - 1
+``O``     `once`                 p holds now or held before
+``H``     `historically`         p holds now and held always before
+``S``     `since`                q holds now or held before, and p has held since
+``T``     `trigger`              not (not p S not q)
+========  =====================  =================================================================
+
+Bounds are in seconds. At period T the bound d means ceil(d/T - 1e-9) ticks.
+
+What `to_spin` and `to_ascii` return, `parse` reads back as the same formula; both leave out as many parentheses as both
+readings allow.
 """
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -337,3 +361,121 @@ def is_bare(whole: Formula, place: int, part: Formula, brackets: Brackets) -> bo
     if whole.op is Op.IFF and part.op is Op.IFF:
         return place == 0
     return JUNCTIONS.index(part.op) < JUNCTIONS.index(whole.op)
+
+
+LONGEST_BOUND: Final = 1e9
+"""Longest bound, seconds: some thirty years."""
+
+
+def _unary(op: Op) -> Callable[[Formula], Formula]:
+    def build(part: Formula) -> Formula:
+        return make(op, (part,))
+
+    build.__doc__ = f"Return {op.value} `part`."
+    return build
+
+
+def _binary(op: Op) -> Callable[[Formula, Formula], Formula]:
+    def build(left: Formula, right: Formula) -> Formula:
+        return make(op, (left, right))
+
+    build.__doc__ = f"Return `left` {op.value} `right`."
+    return build
+
+
+next_ = _unary(Op.X)
+yesterday = _unary(Op.Y)
+weak_yesterday = _unary(Op.Z)
+once = _unary(Op.O)
+historically = _unary(Op.H)
+weak_until = _binary(Op.W)
+strong_release = _binary(Op.M)
+since = _binary(Op.S)
+trigger = _binary(Op.T)
+
+
+def eventually(part: Formula, bounds: Bounds | None = None) -> Formula:
+    """Return F `part`, within `bounds` (seconds) if given."""
+    return make(Op.F, (part,), bounds=interval(bounds))
+
+
+def always(part: Formula, bounds: Bounds | None = None) -> Formula:
+    """Return G `part`, within `bounds` (seconds) if given."""
+    return make(Op.G, (part,), bounds=interval(bounds))
+
+
+def until(left: Formula, right: Formula, bounds: Bounds | None = None) -> Formula:
+    """Return `left` U `right`, `right` within `bounds` (seconds) if given."""
+    return make(Op.U, (left, right), bounds=interval(bounds))
+
+
+def release(left: Formula, right: Formula, bounds: Bounds | None = None) -> Formula:
+    """Return `left` R `right`, `right` asked for within `bounds` (seconds) only if given."""
+    return make(Op.R, (left, right), bounds=interval(bounds))
+
+
+def interval(bounds: Bounds | None) -> Bounds | None:
+    """Return `bounds` as floats; FormulaError if they are not 0 <= a <= b <= `LONGEST_BOUND`."""
+    if bounds is None:
+        return None
+    low, high = float(bounds[0]), float(bounds[1])
+    if not 0.0 <= low <= high <= LONGEST_BOUND:
+        expected = f"[a, b] with 0 <= a <= b <= {LONGEST_BOUND:g}, seconds"
+        raise FormulaError("not an interval", value=list(bounds), expected=expected)
+    return low + 0.0, high + 0.0
+
+
+def ticks(seconds: float, period: float) -> int:
+    """Return how many ticks a duration takes: ceil(seconds / period - 1e-9)."""
+    return max(0, math.ceil(seconds / period - 1e-9))
+
+
+SPIN: Final = Style({Op.F: "<>", Op.G: "[]", Op.R: "V"}, Brackets.MIXED_NEVER)
+
+
+def to_spin(formula: Formula) -> str:
+    """Return `formula` as SPIN writes it: ``[] (a -> <> b)``.
+
+    SPIN ranks all boolean operators equally, so parentheses stand wherever two of them meet. Operators that SPIN
+    lacks (past, bounds, W, M) keep their letters; `exports.spin` rewrites those it can.
+    """
+    return written(formula, SPIN)
+
+
+_AND: Final = conj(prop("p"), prop("q"))
+_IMPLIES: Final = implies(prop("p"), prop("q"))
+"""Stand for formulas that would be too long to be made; only what is at their top matters."""
+
+
+def written_together(formulas: Sequence[Formula], style: Style) -> str:
+    """Return the conjunction of `formulas` spelled in a style.
+
+    It is not made: it may have more parts than a formula can have.
+    """
+    return _together(formulas, style)[1]
+
+
+def written_implication(left: Sequence[Formula], right: Sequence[Formula], style: Style) -> str:
+    """Return that the conjunction of `left` implies that of `right`, in a style; only the latter if `left` is empty."""
+    sides = [_together(formulas, style) for formulas in (left, right)]
+    if not left:
+        return sides[1][1]
+    inner = [
+        text if is_bare(_IMPLIES, place, top, style.brackets) else f"({text})"
+        for place, (top, text) in enumerate(sides)
+    ]
+    return joined_with_sign(_IMPLIES, inner, style)
+
+
+def _together(formulas: Sequence[Formula], style: Style) -> tuple[Formula, str]:
+    """Return a formula with the same top as the conjunction of `formulas`, and the conjunction's text."""
+    flat = [part for formula in formulas for part in (formula.args if formula.op is Op.AND else (formula,))]
+    if len(flat) < 2:
+        whole = conj(*flat)
+        return whole, written(whole, style)
+    texts = [written(part, style) for part in flat]
+    inner = [
+        text if is_bare(_AND, place, part, style.brackets) else f"({text})"
+        for place, (part, text) in enumerate(zip(flat, texts, strict=True))
+    ]
+    return _AND, joined_with_sign(_AND, inner, style)

@@ -33,15 +33,15 @@ from dubins_traffic.logic.formula import (
     iff,
     implies,
     negation,
+    next_,
     prop,
     propositions,
     subformulas,
+    ticks,
     written,
 )
 from dubins_traffic.logic.monitor import parts
-from dubins_traffic.logic.rewrite import mapped, nnf, renamed, simplify
-from dubins_traffic.logic.temporal import next_, ticks
-from dubins_traffic.logic.translation import FreshNames, without_past
+from dubins_traffic.logic.rewrite import FreshNames, mapped, nnf, renamed, simplify, without_past
 
 
 @dataclass(frozen=True)
@@ -91,10 +91,8 @@ def gr1(
 ) -> GR1:
     """Return the specification in GR(1).
 
-    Raises
-    ------
-    FormulaError
-        If a part is of none of the forms above, or if an assumption restricts what the system chooses first or next.
+    FormulaError if a part is of none of the forms above, or if an assumption restricts what the system chooses first
+    or next.
     """
     changed, memories = without_past([*assumptions, *guarantees])
     environment = Side([*inputs, *(memory.name for memory in memories)])

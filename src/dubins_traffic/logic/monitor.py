@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -34,18 +34,104 @@ from dubins_traffic.logic.formula import (
     Formula,
     FormulaError,
     Op,
+    always,
     conj,
     implies,
     propositions,
     subformulas,
 )
 from dubins_traffic.logic.obligations import MAX_PROPOSITIONS
-from dubins_traffic.logic.packing import Piece, packed_lines, packed_tables
 from dubins_traffic.logic.rewrite import renamed
-from dubins_traffic.logic.temporal import always
 
 if TYPE_CHECKING:
     from dubins_traffic.logic.kernel import Lines, Tables
+
+
+class Piece(NamedTuple):
+    """A table that monitors a part of a formula.
+
+    Attributes
+    ----------
+    formula : int
+        The number of the formula.
+    table : Automaton
+        The table.
+    columns : tuple of int
+        Which column of the input each of its propositions is.
+    watch : int
+        The delay line whose waiting requests speak against the formula, or -1.
+    """
+
+    formula: int
+    table: Automaton
+    columns: tuple[int, ...]
+    watch: int
+
+
+def packed_tables(pieces: Sequence[Piece]) -> dict[str, Ints]:
+    """Return the fields of `kernel.Tables`; tables that several parts share stand once."""
+    shared: dict[int, tuple[int, int, int]] = {}
+    kept: list[Automaton] = []
+    places: list[tuple[int, int, int]] = []
+    sizes = (0, 0, 0)
+    for piece in pieces:
+        table = piece.table
+        place = shared.get(id(table.target))
+        if place is None:
+            place = shared[id(table.target)] = sizes
+            kept.append(table)
+            sizes = (
+                sizes[0] + table.letter.size,
+                sizes[1] + table.target.size,
+                sizes[2] + table.verdict.size,
+            )
+        places.append(place)
+    clocks = [len(piece.table.clocks) for piece in pieces]
+    return _as_ints(
+        {
+            "names_off": np.cumsum([0] + [len(piece.columns) for piece in pieces]),
+            "names": [column for piece in pieces for column in piece.columns],
+            "letter_at": [place[0] for place in places],
+            "cell_at": [place[1] for place in places],
+            "verdict_at": [place[2] for place in places],
+            "letters": [piece.table.target.shape[1] for piece in pieces],
+            "clock_count": clocks,
+            "clock_off": np.cumsum([0, *clocks])[:-1],
+            "part_of": [piece.formula for piece in pieces],
+            "watch": [piece.watch for piece in pieces],
+            "letter": _joined([table.letter for table in kept]),
+            "target": _joined([table.target for table in kept]),
+            "reset": _joined([table.reset for table in kept]),
+            "verdict": _joined([table.verdict for table in kept]),
+            "clock_length": _joined([piece.table.clocks for piece in pieces]),
+        }
+    )
+
+
+def packed_lines(lines: Sequence[tuple[Line, int]], column: Mapping[str, int]) -> dict[str, Ints]:
+    """Return the fields of `kernel.Lines`, given each line and its length in ticks."""
+    return _as_ints(
+        {
+            "names_off": np.cumsum([0] + [len(line.names) for line, _ in lines]),
+            "names": [column[name] for line, _ in lines for name in line.names],
+            "letter_at": np.cumsum([0] + [line.letter.size for line, _ in lines])[:-1],
+            "cell_at": np.cumsum([0] + [line.target.size for line, _ in lines])[:-1],
+            "letters": [line.target.shape[1] for line, _ in lines],
+            "ring_off": np.cumsum([0] + [length for _, length in lines]),
+            "letter": _joined([line.letter for line, _ in lines]),
+            "target": _joined([line.target for line, _ in lines]),
+            "value": _joined([line.value for line, _ in lines]),
+        }
+    )
+
+
+def _as_ints(fields: Mapping[str, Any]) -> dict[str, Ints]:
+    return {name: np.ascontiguousarray(value, dtype=np.int64) for name, value in fields.items()}
+
+
+def _joined(arrays: Sequence[Ints]) -> Ints:
+    return np.concatenate([array.reshape(-1) for array in arrays]) if arrays else np.zeros(0, dtype=np.int64)
+
 
 UNROLL: Final = 4
 """Longest bound, ticks, that is counted in states though a clock would do."""
@@ -62,10 +148,7 @@ TOGETHER: Final = Limits(states=256, cells=4_096, sought=1_000, choices=8_192)
 def parts(formula: Formula) -> tuple[Formula, ...]:
     """Return formulas whose conjunction is equivalent to `formula`; what has no temporal operator stays together.
 
-    Raises
-    ------
-    FormulaError
-        If there are more than `MAX_PARTS`.
+    FormulaError if there are more than `MAX_PARTS`.
     """
     split = dict.fromkeys(_split(formula, True))
     plain = [part for part in split if not any(inner.op in FUTURE | PAST for inner in subformulas(part))]

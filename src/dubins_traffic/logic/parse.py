@@ -39,10 +39,10 @@ from dubins_traffic.logic.formula import (
     Op,
     conj,
     disj,
+    interval,
     make,
     prop,
 )
-from dubins_traffic.logic.temporal import interval
 
 T = TypeVar("T")
 
@@ -121,10 +121,7 @@ def parse(text: str, *, file: str | None = None) -> Formula:
 def place_of(text: str, name: str) -> tuple[int, int]:
     """Return line and column, both from 1, at which a proposition first stands in the text of a formula.
 
-    Raises
-    ------
-    ValueError
-        If it does not stand there.
+    ValueError if it does not stand there.
     """
     found = re.search(rf"(?<![A-Za-z0-9_]){re.escape(name)}(?![A-Za-z0-9_])", text)
     if found is None:

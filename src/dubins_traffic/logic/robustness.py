@@ -20,8 +20,7 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.logic.formula import Formula, FormulaError, Op, subformulas
-from dubins_traffic.logic.temporal import ticks
+from dubins_traffic.logic.formula import Formula, FormulaError, Op, subformulas, ticks
 
 
 class Beyond(NamedTuple):

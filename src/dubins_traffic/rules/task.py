@@ -33,8 +33,18 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from dubins_traffic.logic.exports import Specification
-from dubins_traffic.logic.formula import Formula, conj, disj, implies, negation, prop, propositions
-from dubins_traffic.logic.temporal import always, eventually, yesterday
+from dubins_traffic.logic.formula import (
+    Formula,
+    always,
+    conj,
+    disj,
+    eventually,
+    implies,
+    negation,
+    prop,
+    propositions,
+    yesterday,
+)
 from dubins_traffic.rules.judged import JudgedProblem
 from dubins_traffic.rules.parameters import RuleParameters
 

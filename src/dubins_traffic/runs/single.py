@@ -22,8 +22,7 @@ from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import MetricSpec
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators import registry as simulators
-from dubins_traffic.transports.drivers import LocalController, RemoteAgents, RemoteController
-from dubins_traffic.transports.link import Link
+from dubins_traffic.transports.link import Link, LocalController, RemoteAgents, RemoteController
 from dubins_traffic.trial.run import run
 from dubins_traffic.trial.trial import Trial as BareTrial
 from dubins_traffic.viewer.notebook import trial_html

@@ -17,9 +17,13 @@ from dubins_traffic.sandbox.launch import Program
 from dubins_traffic.sandbox.layers import INSTALL, Layers
 from dubins_traffic.sandbox.limits import BoxEnd, Limits
 from dubins_traffic.sandbox.submission import program_of
-from dubins_traffic.transports.answers import AnswerError, command_in, message_in
+from dubins_traffic.transports.line_messages import (
+    AnswerError,
+    command_in,
+    message_in,
+    observation_to_document,
+)
 from dubins_traffic.transports.lines import as_line
-from dubins_traffic.transports.observed import observation_to_document
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem

@@ -12,7 +12,7 @@ from dubins_traffic.controllers.registry import load
 from dubins_traffic.errors import ControllerError, InputError
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.protocols import Closes, Controller, Reports
-from dubins_traffic.transports.observed import observation_from_document
+from dubins_traffic.transports.line_messages import observation_from_document
 from dubins_traffic.trial.endings import checked_command
 from dubins_traffic.trial.seat import checked_reports
 

@@ -21,7 +21,7 @@ from dubins_traffic.kernels.boxes import Box
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Grid, Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.logic.temporal import ticks
+from dubins_traffic.logic.formula import ticks
 from dubins_traffic.roads.lookup import distance2, lane_coordinates, lane_direction_at, nearest_segment
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import FLAG

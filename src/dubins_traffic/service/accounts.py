@@ -39,10 +39,7 @@ class WrongEntryError(DubinsTrafficError):
 def clean_name(name: str, what: str) -> str:
     """Return a name as it is kept: one line, normalised, of visible letters.
 
-    Raises
-    ------
-    WrongEntryError
-        If nothing is left of it, it is too long, or it has signs that can't be seen.
+    WrongEntryError if nothing is left of it, it is too long, or it has signs that can't be seen.
     """
     name = " ".join(unicodedata.normalize("NFKC", name).split())
     if not 1 <= len(name) <= LONGEST_NAME or not name.isprintable():
@@ -99,10 +96,7 @@ def _use(session: Session, code: str, kind: str, at: float) -> Code:
 def register(session: Session, code: str, name: str, password: str, team: str, at: float) -> Account:
     """Make the account of a person who was invited; `team` names the team to found, if the code is for none.
 
-    Raises
-    ------
-    WrongEntryError
-        If the code is not good, or a name or the password is not.
+    WrongEntryError if the code is not good, or a name or the password is not.
     """
     invitation = _use(session, code, "invitation", at)
     name = clean_name(name, "name")

@@ -72,10 +72,7 @@ class Database:
 
         `work` is called anew in a new transaction each time, so it must do nothing outside of it.
 
-        Raises
-        ------
-        sqlalchemy.exc.DBAPIError
-            If the database stays away for `PATIENCE_S`.
+        sqlalchemy.exc.DBAPIError if the database stays away for `PATIENCE_S`.
         """
         until, pause = time.monotonic() + PATIENCE_S, 0.05
         while True:
@@ -100,10 +97,7 @@ class Database:
     def migrate(self, revision: str = "head") -> None:
         """Bring the tables to those of this version of the package, whatever version before it made them.
 
-        Raises
-        ------
-        InputError
-            If a later version made them.
+        InputError if a later version made them.
         """
         config = Config()
         config.set_main_option("script_location", str(Path(__file__).with_name("migrations")))

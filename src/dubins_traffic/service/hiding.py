@@ -50,10 +50,7 @@ class Hiding:
     def show(self, data: bytes, what: str) -> bytes:
         """Return what `hide` was given.
 
-        Raises
-        ------
-        HiddenError
-            If the key is another, or the bytes have been changed or belong to something else.
+        HiddenError if the key is another, or the bytes have been changed or belong to something else.
         """
         if self._cipher is None:
             return data

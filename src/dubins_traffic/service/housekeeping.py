@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.service import organising, queue, standings, submissions
 from dubins_traffic.service.hiding import Hiding
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.tables import Phase, Submission
 
 PAUSE_S = 1.0
@@ -22,22 +22,22 @@ PODIUM = 3
 log = structlog.get_logger("dubins_traffic.service")
 
 
-def end_silent(office: Office, *, was_away: bool = False) -> None:
+def end_silent(service: Service, *, was_away: bool = False) -> None:
     """End leases that have run out, and submissions whose deadline has passed.
 
     Parameters
     ----------
-    office : Office
+    service : Service
         The service.
     was_away : bool
         The service or its database was away until now, for some writers at least. Workers could not renew their
         leases then, so all leases begin anew.
     """
-    with office.database.writing() as session:
+    with service.database.writing() as session:
         if was_away:
-            queue.renew(session, office.clock() + office.settings.lease)
-        end_leases(session, office.clock())
-        end_overdue(session, office.clock())
+            queue.renew(session, service.clock() + service.settings.lease)
+        end_leases(session, service.clock())
+        end_overdue(session, service.clock())
 
 
 def end_leases(session: Session, at: float) -> None:
@@ -62,11 +62,11 @@ def end_overdue(session: Session, at: float) -> None:
         submissions.fail(session, submission, f"stayed {submission.state} for too long", at)
 
 
-def check_podiums(office: Office) -> None:
+def check_podiums(service: Service) -> None:
     """Queue all trials of the first entries of phases that have closed a second time, once."""
-    with office.database.writing() as session:
+    with service.database.writing() as session:
         due = select(Phase).where(
-            Phase.closes <= office.clock(), Phase.podium_checked.is_(False), Phase.shows != "all"
+            Phase.closes <= service.clock(), Phase.podium_checked.is_(False), Phase.shows != "all"
         )
         for phase in session.scalars(due).all():
             active = Submission.state.in_(submissions.ACTIVE)
@@ -74,7 +74,7 @@ def check_podiums(office: Office) -> None:
                 select(Submission.id).where(Submission.phase_id == phase.id, active).limit(1)
             )
             if busy.first() is None and phase.ranked >= phase.version:
-                _run_podium_again(session, phase, office.hiding(phase))
+                _run_podium_again(session, phase, service.hiding(phase))
 
 
 def _run_podium_again(session: Session, phase: Phase, hiding: Hiding) -> None:
@@ -90,7 +90,7 @@ STEPS = (organising.publish_opened, standings.refresh, check_podiums)
 """What is due again and again; each step may be taken twice, and does not wait for another that fails."""
 
 
-def sweep(office: Office, *, was_away: bool = False) -> bool:
+def sweep(service: Service, *, was_away: bool = False) -> bool:
     """Take every step; one that fails is told of and taken again the next time.
 
     Returns
@@ -98,16 +98,16 @@ def sweep(office: Office, *, was_away: bool = False) -> bool:
     bool
         Whether leases could be looked after; if not, the next sweep is told that the service `was_away`.
     """
-    looked_after = _taken(office, partial(end_silent, was_away=was_away), "end_silent")
+    looked_after = _taken(service, partial(end_silent, was_away=was_away), "end_silent")
     for step in STEPS:
-        _taken(office, step, step.__name__)
+        _taken(service, step, step.__name__)
     return looked_after
 
 
-def _taken(office: Office, step: Callable[[Office], None], name: str) -> bool:
+def _taken(service: Service, step: Callable[[Service], None], name: str) -> bool:
     """Take a step, and return whether it was taken."""
     try:
-        step(office)
+        step(service)
     except DBAPIError as error:
         log.warning("the database is away", step=name, error=str(error.orig))
         return False
@@ -120,9 +120,9 @@ def _taken(office: Office, step: Callable[[Office], None], name: str) -> bool:
 class Housekeeper(threading.Thread):
     """Sweeps every second until it is told to stop; a database that is away is waited for."""
 
-    def __init__(self, office: Office) -> None:
+    def __init__(self, service: Service) -> None:
         super().__init__(name="housekeeper", daemon=True)
-        self._office = office
+        self._service = service
         self._stop_asked = threading.Event()
         self._looked_after = False
 
@@ -133,8 +133,8 @@ class Housekeeper(threading.Thread):
 
     def sweep(self) -> None:
         """Sweep once; leases begin anew if the last sweep, or a writer since then, has found the database away."""
-        was_away = self._office.database.was_away() or not self._looked_after
-        self._looked_after = sweep(self._office, was_away=was_away)
+        was_away = self._service.database.was_away() or not self._looked_after
+        self._looked_after = sweep(self._service, was_away=was_away)
 
     def stop(self) -> None:
         """End the sweeping, and wait for the last."""

@@ -1,13 +1,15 @@
-"""What an organiser does with competitions: create, open, close, judge again, disqualify, reveal. All is logged."""
+"""What an organiser does with competitions: create, open, close, judge again, disqualify, reveal, export; logged."""
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import shutil
 import tempfile
 import tomllib
-from collections.abc import Mapping
+import zipfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any, cast
 
@@ -18,9 +20,9 @@ from dubins_traffic.competition import sealing
 from dubins_traffic.competition.competition import FILE, load_competition
 from dubins_traffic.competition.competition import Competition as Loaded
 from dubins_traffic.errors import DubinsTrafficError, InputError, shown
-from dubins_traffic.service import submissions
+from dubins_traffic.service import receiving, standings, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError, note
-from dubins_traffic.service.office import Office, competition_of
+from dubins_traffic.service.service import Service, competition_of
 from dubins_traffic.service.tables import Account, Competition, Phase, Submission
 
 SLUG = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,58}[a-z0-9])?")
@@ -28,12 +30,12 @@ PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
 NOTHING_TO_DO = "the phase is {} already"
 
 
-def create(office: Office, slug: str, given: Mapping[str, bytes], by: Account | None) -> Competition:
+def create(service: Service, slug: str, given: Mapping[str, bytes], by: Account | None) -> Competition:
     """Make a competition from its files: ``competition.toml``, and the configurations and networks it names.
 
     Parameters
     ----------
-    office : Office
+    service : Service
         The service.
     slug : str
         Its address: lower letters, digits and hyphens.
@@ -52,23 +54,23 @@ def create(office: Office, slug: str, given: Mapping[str, bytes], by: Account | 
     if not SLUG.fullmatch(slug):
         raise WrongEntryError("address: lower-case letters, digits and hyphens, 60 at most")
     given = {FILE: next(iter(given.values()))} if len(given) == 1 else given
-    place = office.place(slug)
+    place = service.place(slug)
     place.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=place.parent) as draft:
         loaded = _written(Path(draft), given)
         for phase in loaded.phases:
             if phase.secret:
-                sealing.seal(phase, office.needed_key())
-        with office.database.writing() as session:
+                sealing.seal(phase, service.needed_key())
+        with service.database.writing() as session:
             if competition_of(session, slug) is not None:
                 raise WrongEntryError("address: taken")
-            made = _rows(session, slug, loaded, office.clock())
-            note(session, by, "create", slug, loaded.title, office.clock())
+            made = _rows(session, slug, loaded, service.clock())
+            note(session, by, "create", slug, loaded.title, service.clock())
             shutil.rmtree(
                 place, ignore_errors=True
             )  # of a creation that was killed before its rows were kept
             shutil.copytree(draft, place)
-    publish_opened(office)
+    publish_opened(service)
     return made
 
 
@@ -136,36 +138,36 @@ def _rows(session: Session, slug: str, loaded: Loaded, at: float) -> Competition
     return made
 
 
-def publish_opened(office: Office) -> None:
+def publish_opened(service: Service) -> None:
     """Publish the commitments of phases that have opened since the last time."""
-    at = office.clock()
-    with office.database.reading() as session:
+    at = service.clock()
+    with service.database.reading() as session:
         rows = session.scalars(select(Phase).where(Phase.commitment.is_(None))).all()
         found: dict[int, str] = {}
         for row in rows:
-            phase = office.phase(row)
+            phase = service.phase(row)
             if phase.secret and (row.opens is None or row.opens <= at):
                 found[row.id] = sealing.publish(phase, row.competition.title).commitment
     if found:
-        with office.database.writing() as session:
+        with service.database.writing() as session:
             for number, commitment in found.items():
                 row = session.get_one(Phase, number)
                 row.commitment = commitment
                 note(session, None, "publish", _name(row), commitment, at)
 
 
-def open_phase(office: Office, session: Session, phase: Phase, by: Account) -> None:
+def open_phase(service: Service, session: Session, phase: Phase, by: Account) -> None:
     """Open a phase now; RefusedError if it is open or over."""
-    at = office.clock()
+    at = service.clock()
     if phase.is_open(at) or phase.is_closed(at):
         raise submissions.RefusedError(NOTHING_TO_DO.format("open" if phase.is_open(at) else "closed"))
     phase.opens = at
     note(session, by, "open", _name(phase), "", at)
 
 
-def close_phase(office: Office, session: Session, phase: Phase, by: Account) -> None:
+def close_phase(service: Service, session: Session, phase: Phase, by: Account) -> None:
     """Close a phase now; what is received from this second on does not count. RefusedError if it is over."""
-    at = office.clock()
+    at = service.clock()
     if phase.is_closed(at):
         raise submissions.RefusedError(NOTHING_TO_DO.format("closed"))
     phase.closes = at
@@ -173,43 +175,126 @@ def close_phase(office: Office, session: Session, phase: Phase, by: Account) -> 
     note(session, by, "close", _name(phase), "", at)
 
 
-def reveal(office: Office, session: Session, phase: Phase, by: Account) -> None:
+def reveal(service: Service, session: Session, phase: Phase, by: Account) -> None:
     """Reveal the secret seeds of a phase that has closed and whose submissions have all ended.
 
-    Raises
-    ------
-    RefusedError
-        If the phase has no secret seeds, is not over, or something of it is still to be run.
+    RefusedError if the phase has no secret seeds, is not over, or something of it is still to be run.
     """
-    at = office.clock()
+    at = service.clock()
     active = Submission.state.in_(submissions.ACTIVE)
     if session.scalars(select(Submission).where(Submission.phase_id == phase.id, active).limit(1)).first():
         raise submissions.RefusedError("submissions of this phase are still to be judged")
     if phase.revealed is not None:
         raise submissions.RefusedError("the seeds are revealed already")
     try:
-        sealing.reveal(office.phase(phase), office.needed_key())
+        sealing.reveal(service.phase(phase), service.needed_key())
     except DubinsTrafficError as error:
         raise submissions.RefusedError(str(error)) from error
     phase.revealed = at
     note(session, by, "reveal", _name(phase), phase.commitment or "", at)
 
 
-def judge_again(office: Office, session: Session, submission: Submission, by: Account, why: str) -> None:
+def judge_again(service: Service, session: Session, submission: Submission, by: Account, why: str) -> None:
     """Let a submission be judged anew, all of it."""
-    at = office.clock()
-    submissions.judge_again(session, submission, office.phase(submission.phase).numbers, at)
+    at = service.clock()
+    submissions.judge_again(session, submission, service.phase(submission.phase).numbers, at)
     submission.phase.version += 1
     note(session, by, "rejudge", f"submission {submission.id}", why, at)
 
 
-def disqualify(office: Office, session: Session, submission: Submission, by: Account, why: str) -> None:
+def disqualify(service: Service, session: Session, submission: Submission, by: Account, why: str) -> None:
     """Take a submission out of the ranking, with the reason that its team reads; an empty one lets it in again."""
     submission.disqualified = why.strip()[:500]
     submission.phase.version += 1
     act = "disqualify" if submission.disqualified else "readmit"
-    note(session, by, act, f"submission {submission.id}", submission.disqualified, office.clock())
+    note(session, by, act, f"submission {submission.id}", submission.disqualified, service.clock())
 
 
 def _name(phase: Phase) -> str:
     return f"{phase.competition.slug}/{phase.name}"
+
+
+EPOCH = (1980, 1, 1, 0, 0, 0)
+"""The date of everything in the archive, so that equal contents are equal bytes."""
+README = """\
+A competition of dubins-traffic, exported.
+
+  competition.toml, *.json    the competition as it was run
+  published/                  commitments to secret seeds, and the seeds where they are revealed
+  submissions/DIGEST          what teams have sent
+  PHASE/submissions.json      all submissions of a phase, and which of them counted
+  PHASE/results-N.json        the results of submission N, a row a trial; why a controller failed is its team's alone
+  PHASE/table.json            the places
+
+Run the entry on the first place again, and compare its rows:
+
+  dubins-traffic evaluate submissions/DIGEST --competition competition.toml --phase PHASE
+"""
+
+
+def export(service: Service, session: Session, row: Competition) -> bytes:
+    """Return a competition as a zip archive; phases that are still open are left out.
+
+    Parameters
+    ----------
+    service : Service
+        The service.
+    session : Session
+        A reader's.
+    row : Competition
+        Which one.
+    """
+    made = io.BytesIO()
+    with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, data in _entries(service, session, row):
+            archive.writestr(zipfile.ZipInfo(name, EPOCH), data, zipfile.ZIP_DEFLATED)
+    return made.getvalue()
+
+
+def _entries(service: Service, session: Session, row: Competition) -> Iterator[tuple[str, bytes]]:
+    yield "README.txt", README.encode()
+    place = service.place(row.slug)
+    for path in sorted(item for item in place.rglob("*") if item.is_file()):
+        name = path.relative_to(place)
+        if name.parts[0] != "sealed":
+            yield name.as_posix(), path.read_bytes()
+    sent: set[str] = set()
+    for phase in row.phases:
+        if not phase.is_closed(service.clock()) and phase.shows != "all":
+            continue
+        found = receiving.submissions_of(session, phase, None)
+        yield from _of_phase(service, session, phase, found)
+        sent |= {one.digest for one in found}
+    for digest in sorted(sent):
+        yield f"submissions/{digest}", service.storage.get(digest, "submissions")
+
+
+def _of_phase(
+    service: Service, session: Session, phase: Phase, found: list[Submission]
+) -> Iterator[tuple[str, bytes]]:
+    hiding = service.hiding(phase)
+    latest = standings.latest_standing(session, phase, hiding)
+    counted = {own.id for own in standings.counting(session, phase).values()}
+    yield f"{phase.name}/table.json", _json([] if latest is None else latest.places)
+    described = [
+        {
+            "submission": one.id,
+            "team": one.team.name,
+            "digest": one.digest,
+            "content": one.content,
+            "received": viewing.iso(one.received),
+            "state": one.state,
+            "disqualified": one.disqualified,
+            "counted": one.id in counted,
+        }
+        for one in sorted(found, key=lambda own: own.id)
+    ]
+    yield f"{phase.name}/submissions.json", _json(described)
+    for one in found:
+        trials = submissions.trials(session, one, hiding)
+        rows = [{**viewing.shared(own.row), "frames": own.frames} for own in trials]
+        yield f"{phase.name}/results-{one.id}.json", _json(rows)
+
+
+def _json(document: object) -> bytes:
+    return (json.dumps(document, indent=1, sort_keys=True, ensure_ascii=False) + "\n").encode()

@@ -68,10 +68,7 @@ def take(session: Session, worker: str, at: float, seconds: float) -> Chunk | No
 def held(session: Session, chunk_id: int, token: int) -> Chunk:
     """Return the chunk that is on lease under a token.
 
-    Raises
-    ------
-    StaleLeaseError
-        If the lease has ended: it ran out and another has it, or the work was cancelled.
+    StaleLeaseError if the lease has ended: it ran out and another has it, or the work was cancelled.
     """
     chunk = session.get(Chunk, chunk_id) if chunk_id <= LARGEST else None
     if chunk is None or chunk.state != "leased" or chunk.token != token:

@@ -19,7 +19,7 @@ from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.runs.ray_crew import check_address
 from dubins_traffic.runs.ray_driver import PACKAGE, join
 from dubins_traffic.service import logs
-from dubins_traffic.service.connection import Connection
+from dubins_traffic.service.client import Connection
 from dubins_traffic.service.worker import Worker, default_folder
 
 LOOK_S = 1.0
@@ -109,10 +109,8 @@ class Carrier:
     def carry(self) -> None:
         """Carry the workers until this process is told to end; what they have on lease is given back then.
 
-        Raises
-        ------
-        DubinsTrafficError
-            If a node is not fit for this work: it can't hold strangers' programs, or has another version.
+        DubinsTrafficError if a node is not fit for this work: it can't hold strangers' programs, or has another
+        version.
         """
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._leave)

@@ -10,7 +10,7 @@ from sqlalchemy.orm import Session
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service import submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
-from dubins_traffic.service.office import Office, phase_of
+from dubins_traffic.service.service import Service, phase_of
 from dubins_traffic.service.submissions import RefusedError, Upload
 from dubins_traffic.service.tables import Account, Phase, Submission
 
@@ -36,7 +36,7 @@ def found_submission(session: Session, number: int, account: Account | None) -> 
 
 
 def take_in(
-    office: Office, account: Account, slug: str, name: str, filename: str, data: bytes
+    service: Service, account: Account, slug: str, name: str, filename: str, data: bytes
 ) -> tuple[int, bool]:
     """Keep what somebody has sent and queue it; the same again is the same submission.
 
@@ -55,47 +55,44 @@ def take_in(
     """
     if not data:
         raise WrongEntryError("file: empty; choose a controller in Python, a zip archive or a program")
-    if len(data) > office.settings.largest_upload << 20:
-        raise WrongEntryError(f"file: at most {office.settings.largest_upload} MiB")
-    at = office.clock()
+    if len(data) > service.settings.largest_upload << 20:
+        raise WrongEntryError(f"file: at most {service.settings.largest_upload} MiB")
+    at = service.clock()
     upload = Upload(hashlib.sha256(data).hexdigest(), filename or "upload", len(data))
-    with office.database.reading() as session:
+    with service.database.reading() as session:
         phase = found_phase(session, slug, name)
-        submissions.admitted(session, phase, office.phase(phase).quota, account, upload, at)
-    office.storage.put(data, "submissions")
+        submissions.admitted(session, phase, service.phase(phase).quota, account, upload, at)
+    service.storage.put(data, "submissions")
 
     def keep(session: Session) -> tuple[int, bool]:
         row = found_phase(session, slug, name)
         own = session.get_one(Account, account.id)
-        submission, new = submissions.receive(session, row, office.phase(row).quota, own, upload, at)
+        submission, new = submissions.receive(session, row, service.phase(row).quota, own, upload, at)
         return submission.id, new
 
-    return office.database.patiently(keep)
+    return service.database.patiently(keep)
 
 
-def cancel(office: Office, account: Account, number: int) -> None:
+def cancel(service: Service, account: Account, number: int) -> None:
     """Cancel a submission of somebody's team; RefusedError if it has ended."""
 
     def end(session: Session) -> None:
-        submissions.cancel(session, found_submission(session, number, account), office.clock())
+        submissions.cancel(session, found_submission(session, number, account), service.clock())
 
-    office.database.patiently(end)
+    service.database.patiently(end)
 
 
-def name_it(office: Office, account: Account, number: int) -> None:
+def name_it(service: Service, account: Account, number: int) -> None:
     """Let a submission be the one of its team that counts in its phase.
 
-    Raises
-    ------
-    RefusedError
-        If the phase is over, or the submission was rejected or cancelled.
+    RefusedError if the phase is over, or the submission was rejected or cancelled.
     """
 
     def choose(session: Session) -> None:
         submission = found_submission(session, number, account)
         if submission.team_id != account.team_id:
             raise RefusedError("only its team may name it")
-        if submission.phase.is_closed(office.clock()):
+        if submission.phase.is_closed(service.clock()):
             raise RefusedError("the phase is closed")
         if submission.state in ("rejected", "cancelled"):
             raise RefusedError(f"it is {submission.state}")
@@ -106,7 +103,7 @@ def name_it(office: Office, account: Account, number: int) -> None:
         submission.named = True
         submission.phase.version += 1
 
-    office.database.patiently(choose)
+    service.database.patiently(choose)
 
 
 def submissions_of(session: Session, phase: Phase, team_id: int | None) -> list[Submission]:

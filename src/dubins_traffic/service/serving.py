@@ -19,9 +19,9 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.service import accounts, organising
-from dubins_traffic.service.connection import TOKEN
+from dubins_traffic.service.client import TOKEN
 from dubins_traffic.service.housekeeping import Housekeeper
-from dubins_traffic.service.office import Office, competition_of
+from dubins_traffic.service.service import Service, competition_of
 from dubins_traffic.service.tables import Account, Code, Token
 from dubins_traffic.service.web.app import create_app
 
@@ -63,7 +63,7 @@ def address_of(opened: socket.socket) -> str:
     return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
 
-def prepare(office: Office, competitions: list[Path], url: str) -> str | None:
+def prepare(service: Service, competitions: list[Path], url: str) -> str | None:
     """Bring the tables up to date and make competitions that are not there yet.
 
     Returns
@@ -76,34 +76,34 @@ def prepare(office: Office, competitions: list[Path], url: str) -> str | None:
     InputError
         If a competition can't be made.
     """
-    office.database.migrate()
+    service.database.migrate()
     for path in competitions:
         slug = organising.slug_of(path)
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             known = competition_of(session, slug)
         if known is None:
-            organising.create(office, slug, organising.files_of(path), None)
-    with office.database.writing() as session:
+            organising.create(service, slug, organising.files_of(path), None)
+    with service.database.writing() as session:
         organisers = select(func.count()).where(Account.role == accounts.ORGANISER, Account.removed.is_(None))
         if session.scalar(organisers):
             return None
         unused = update(Code).where(Code.role == accounts.ORGANISER, Code.used.is_(None))
-        session.execute(unused.values(used=office.clock()))
-        code = accounts.invite(session, accounts.ORGANISER, None, office.clock())
-    return f"{office.settings.url.rstrip('/') or url}/join?code={code}"
+        session.execute(unused.values(used=service.clock()))
+        code = accounts.invite(session, accounts.ORGANISER, None, service.clock())
+    return f"{service.settings.url.rstrip('/') or url}/join?code={code}"
 
 
-def local_token(office: Office) -> str:
+def local_token(service: Service) -> str:
     """Return a token for the workers beside this server; those of servers before it end."""
 
     def make(session: Session) -> str:
         old = update(Token).where(
             Token.name == accounts.LOCAL, Token.account_id.is_(None), Token.revoked.is_(None)
         )
-        session.execute(old.values(revoked=office.clock()))
-        return accounts.new_token(session, accounts.LOCAL, None, office.clock())
+        session.execute(old.values(revoked=service.clock()))
+        return accounts.new_token(session, accounts.LOCAL, None, service.clock())
 
-    return office.database.patiently(make)
+    return service.database.patiently(make)
 
 
 class Workers(threading.Thread):
@@ -185,13 +185,13 @@ class Server(uvicorn.Server):
 
 
 def serve(
-    office: Office, opened: socket.socket, workers: int, program: Sequence[str], *, trust: bool = False
+    service: Service, opened: socket.socket, workers: int, program: Sequence[str], *, trust: bool = False
 ) -> None:
     """Serve until this process is told to end.
 
     Parameters
     ----------
-    office : Office
+    service : Service
         Whose tables are up to date.
     opened : socket
         Where to listen.
@@ -203,20 +203,20 @@ def serve(
         As for workers.
     """
     config = uvicorn.Config(
-        create_app(office),
+        create_app(service),
         proxy_headers=True,
-        forwarded_allow_ips=",".join(office.settings.proxies),
+        forwarded_allow_ips=",".join(service.settings.proxies),
         server_header=False,
         access_log=False,
         log_level="warning",
         timeout_graceful_shutdown=10,
     )
     beside = Workers(
-        workers, program, address_of(opened), local_token(office), office.folder / "work", trust=trust
+        workers, program, address_of(opened), local_token(service), service.folder / "work", trust=trust
     )
     for number in (signal.SIGINT, signal.SIGTERM):  # the server raises them again when it has ended
         signal.signal(number, _nothing)
-    keeper = Housekeeper(office)
+    keeper = Housekeeper(service)
     keeper.start()
     beside.start()
     try:
@@ -224,4 +224,4 @@ def serve(
     finally:
         beside.stop()
         keeper.stop()
-        office.close()
+        service.close()

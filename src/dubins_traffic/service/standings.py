@@ -14,7 +14,7 @@ from dubins_traffic.competition.judging import Judged
 from dubins_traffic.competition.ranking import missing, rank
 from dubins_traffic.service import submissions
 from dubins_traffic.service.hiding import HiddenError, Hiding
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.tables import Phase, Standing, Submission, Team, Trial
 
 log = structlog.get_logger("dubins_traffic.service")
@@ -50,35 +50,35 @@ def counting(session: Session, phase: Phase) -> Mapping[int, Submission]:
     return found
 
 
-def refresh(office: Office) -> None:
+def refresh(service: Service) -> None:
     """Rank the phases whose results have changed, and end the submissions that waited for it."""
     scoring = select(Submission.phase_id).where(Submission.state == "scoring")
-    with office.database.reading() as session:
+    with service.database.reading() as session:
         due = session.scalars(
             select(Phase.id).where((Phase.version > Phase.ranked) | Phase.id.in_(scoring))
         ).all()
     for number in due:
         try:
-            _rank_phase(office, number)
+            _rank_phase(service, number)
         except HiddenError as error:  # the other phases do not wait for one that can't be read
             log.error("a phase can't be ranked", phase=number, error=str(error))
 
 
-def _rank_phase(office: Office, number: int) -> None:
+def _rank_phase(service: Service, number: int) -> None:
     """Rank a phase in a reader's session, since it takes its time; nothing is kept that has changed meanwhile."""
-    at = office.clock()
-    with office.database.reading() as session:
+    at = service.clock()
+    with service.database.reading() as session:
         row = session.get_one(Phase, number)
         waiting = session.scalars(
             select(Submission.id).where(Submission.phase_id == number, Submission.state == "scoring")
         ).all()
         silent = row.shows == "aggregates" and not row.is_closed(at) and not _may_answer(session, row, at)
         version = row.version
-        hiding = office.hiding(row)
-        places = None if silent or version == row.ranked else table(session, row, office.phase(row), hiding)
+        hiding = service.hiding(row)
+        places = None if silent or version == row.ranked else table(session, row, service.phase(row), hiding)
     if silent and not waiting:
         return
-    with office.database.writing() as session:
+    with service.database.writing() as session:
         for submission in session.scalars(select(Submission).where(Submission.id.in_(waiting))):
             if submission.state == "scoring":
                 submissions.enter(submission, "done", at)

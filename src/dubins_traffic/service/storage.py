@@ -45,10 +45,7 @@ class Storage:
     def put(self, data: bytes, kind: str) -> str:
         """Keep bytes of a kind (`submissions`, `replays`), and return their SHA-256.
 
-        Raises
-        ------
-        StorageError
-            If they can't be kept; nothing of them is seen then.
+        StorageError if they can't be kept; nothing of them is seen then.
         """
         digest = hashlib.sha256(data).hexdigest()
         try:

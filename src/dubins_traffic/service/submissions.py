@@ -204,10 +204,7 @@ def fail(session: Session, submission: Submission, reason: str, at: float) -> No
 def cancel(session: Session, submission: Submission, at: float) -> None:
     """End a submission as its team wishes; what has not begun to run costs no quota.
 
-    Raises
-    ------
-    RefusedError
-        If it has ended already.
+    RefusedError if it has ended already.
     """
     if submission.state not in ACTIVE:
         raise RefusedError(f"it is {submission.state} already")
@@ -294,10 +291,7 @@ def _kept(session: Session, submission: Submission, *, logs: bool = False) -> Se
 def judge_again(session: Session, submission: Submission, numbers: Sequence[int], at: float) -> None:
     """Judge a submission anew, from its trials on; the results so far are kept as those of an earlier run.
 
-    Raises
-    ------
-    RefusedError
-        If it was rejected, so that there is nothing to run, or has not been checked yet.
+    RefusedError if it was rejected, so that there is nothing to run, or has not been checked yet.
     """
     if submission.state == "rejected":
         raise RefusedError("it was rejected: there is nothing to run")

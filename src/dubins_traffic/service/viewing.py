@@ -11,7 +11,7 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.visibility import SubmissionState, visible
 from dubins_traffic.service import queue, standings, submissions
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.tables import Account, Chunk, Competition, Phase, Submission, Trial, Worker
 
 ALIVE_S = 120.0
@@ -59,20 +59,20 @@ def replay_of(trial: Trial, submission: Submission, account: Account | None) -> 
     return (owns(account, submission) and trial.own_replay) or trial.replay
 
 
-def told_competition(office: Office, row: Competition) -> dict[str, Any]:
+def told_competition(service: Service, row: Competition) -> dict[str, Any]:
     """Return a competition for everybody."""
-    at, loaded = office.clock(), office.competition(row)
+    at, loaded = service.clock(), service.competition(row)
     return {
         "address": row.slug,
         "title": row.title,
         "about": loaded.model.about,
-        "phases": [told_phase(office, phase, at) for phase in row.phases],
+        "phases": [told_phase(service, phase, at) for phase in row.phases],
     }
 
 
-def told_phase(office: Office, row: Phase, at: float) -> dict[str, Any]:
+def told_phase(service: Service, row: Phase, at: float) -> dict[str, Any]:
     """Return a phase for everybody."""
-    phase = office.phase(row)
+    phase = service.phase(row)
     return {
         "name": row.name,
         "shows": row.shows,
@@ -89,7 +89,7 @@ def told_phase(office: Office, row: Phase, at: float) -> dict[str, Any]:
 
 
 def told_submission(
-    office: Office,
+    service: Service,
     session: Session,
     submission: Submission,
     account: Account | None,
@@ -108,10 +108,10 @@ def told_submission(
         iso(submission.received),
         place,
     )
-    found = submissions.trials(session, submission, office.hiding(row), logs=logs)
+    found = submissions.trials(session, submission, service.hiding(row), logs=logs)
     results = standings.judged(found, logs=logs)
-    now = datetime.fromtimestamp(office.clock(), UTC)
-    phase = office.phase(row)
+    now = datetime.fromtimestamp(service.clock(), UTC)
+    phase = service.phase(row)
     if is_organiser(account):
         open_model = phase.model.model_copy(update={"shows": "all"})
         phase = type(phase)(phase.name, open_model, phase.configurations, phase.ranking, phase.folder)
@@ -133,24 +133,24 @@ def told_submission(
     }
 
 
-def differing(office: Office, session: Session, submission: Submission) -> list[int]:
+def differing(service: Service, session: Session, submission: Submission) -> list[int]:
     """Return the trials whose frames were others when they were run a second time."""
-    own = submissions.trials(session, submission, office.hiding(submission.phase))
+    own = submissions.trials(session, submission, service.hiding(submission.phase))
     return [trial.number for trial in own if trial.again is not None and trial.again != trial.frames]
 
 
-def trial_of(office: Office, session: Session, submission: Submission, number: int) -> Trial | None:
+def trial_of(service: Service, session: Session, submission: Submission, number: int) -> Trial | None:
     """Return the result of a trial of a submission's present run, its log with it."""
     query = select(Trial).where(
         Trial.submission_id == submission.id, Trial.run == submission.run, Trial.number == number
     )
     found = session.scalars(query).first()
-    return None if found is None else office.hiding(submission.phase).shown(found, logs=True)
+    return None if found is None else service.hiding(submission.phase).shown(found, logs=True)
 
 
-def told_status(office: Office, session: Session) -> dict[str, Any]:
+def told_status(service: Service, session: Session) -> dict[str, Any]:
     """Return how long the queue is and how many workers there are, for everybody."""
-    at = office.clock()
+    at = service.clock()
     counts = session.execute(
         select(Chunk.state, func.count()).where(Chunk.state.in_(["waiting", "leased"])).group_by(Chunk.state)
     )

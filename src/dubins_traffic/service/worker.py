@@ -26,7 +26,7 @@ from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.record.reader import Record, from_bytes
 from dubins_traffic.sandbox import available_layers
 from dubins_traffic.sandbox.submission import program_of
-from dubins_traffic.service.connection import AwayError, Connection, RefusalError
+from dubins_traffic.service.client import AwayError, Connection, RefusalError
 
 log = structlog.get_logger("dubins_traffic.worker")
 IDLE_S = 0.5
@@ -70,10 +70,7 @@ class Worker:
     def work(self) -> None:
         """Work until `stop`, then hang up; a service that is away is waited for.
 
-        Raises
-        ------
-        InputError
-            If this machine can't hold a stranger's program, and the worker does not trust submissions.
+        InputError if this machine can't hold a stranger's program, and the worker does not trust submissions.
         """
         check_boxes(trust=self._trust)
         with contextlib.closing(self._service):

@@ -33,13 +33,10 @@ from dubins_traffic.runs.plan import check_data_file, concluded, load_runnable
 from dubins_traffic.runs.record_folder import Earlier, check_choice, check_folder, claim
 from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.scoring.score import ScoreSheet
-from dubins_traffic.sessions.foreign import run_under
-from dubins_traffic.sessions.remote import Session, hand_over, quiet, run_remote
-from dubins_traffic.transports.clocks import Lockstep, RealTime
-from dubins_traffic.transports.foreign import ForeignMaestro
+from dubins_traffic.sessions.remote import Session, hand_over, quiet, run_remote, run_under
+from dubins_traffic.transports.clocks import Lockstep, Patience, RealTime
 from dubins_traffic.transports.link import Link
-from dubins_traffic.transports.maestro import Maestro
-from dubins_traffic.transports.patience import Patience
+from dubins_traffic.transports.maestro import ForeignMaestro, Maestro
 
 SOON = 1.0
 """Seconds after which is told that something is compiled."""
@@ -142,7 +139,7 @@ class SessionPlan:
 
         Once the transport is open, `world` makes the simulator, in place of the one that instances name, and `at`
         returns a line for people with the transport's address. `foreign`, if given, starts and ends the trials; see
-        `foreign.run_under`.
+        `remote.run_under`.
         """
         held = ExitStack()
         try:

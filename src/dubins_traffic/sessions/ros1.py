@@ -12,14 +12,12 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.runs.plan import check_simulator
 from dubins_traffic.runs.single import Result
 from dubins_traffic.sessions.plan import Pace, SessionPlan, moved_by
-from dubins_traffic.transports.foreign import ForeignMaestro
-from dubins_traffic.transports.maestro import Maestro
+from dubins_traffic.transports.maestro import ForeignMaestro, Maestro
 from dubins_traffic.transports.ros1.external import NAME as WORLD
 from dubins_traffic.transports.ros1.external import ExternalWorld
-from dubins_traffic.transports.ros1.maestro_services import SessionParameters
 from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.node import leave
-from dubins_traffic.transports.ros1.transport import Ros1
+from dubins_traffic.transports.ros1.transport import Ros1, SessionParameters
 
 DEFAULT_URI = "http://localhost:11311/"
 

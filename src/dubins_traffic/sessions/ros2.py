@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 def make_transport(
     domain: int | None, maestro: Maestro | None, *, here: bool = True, clock: bool = False
 ) -> Ros2:
-    """Return the transport.
-
-    Raises
-    ------
-    MissingExtraError
-        If the extra `ros2` is not installed.
-    """
+    """Return the transport; MissingExtraError if the extra `ros2` is not installed."""
     try:
         from dubins_traffic.transports.ros2.transport import Ros2
     except ImportError as error:

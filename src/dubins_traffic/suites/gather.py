@@ -15,17 +15,14 @@ from typing import Any
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, write_text
 from dubins_traffic.problem.files import parse_json
-from dubins_traffic.suites.cases import case_instances
+from dubins_traffic.suites.running import case_instances
 from dubins_traffic.suites.suite import Suite
 
 
 def gather(name: str, title: str, folder: Path) -> dict[str, Any]:
     """Return the document of a suite of the cases in a folder, in the order of their names.
 
-    Raises
-    ------
-    InputError
-        If there is no such file, or one is no case.
+    InputError if there is no such file, or one is no case.
     """
     files = sorted(folder.rglob("*.json"))
     if not files:

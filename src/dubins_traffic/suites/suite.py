@@ -202,13 +202,7 @@ def shipped_suites() -> list[str]:
 
 
 def load_suite(name: str | os.PathLike[str]) -> Suite:
-    """Return the suite of a shipped name, or in a file.
-
-    Raises
-    ------
-    InputError
-        If there is none, or something in it is wrong.
-    """
+    """Return the suite of a shipped name, or in a file; InputError if there is none, or something in it is wrong."""
     text = os.fspath(name)
     known = shipped_suites()
     if text in known:

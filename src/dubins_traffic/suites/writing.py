@@ -9,15 +9,15 @@ from typing import Any
 
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.report.comparison import WALL_METRICS, Comparison, Standing, shown
-from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.statistics import Estimate, Share, share
-from dubins_traffic.campaign.report.write import csv_files
+from dubins_traffic.campaign.report.write import csv_files, page
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, require_output, write_text
 from dubins_traffic.record.sink import BY_CONTROLLER, FAULTS
 from dubins_traffic.scoring.columns import SCORES, SECOND
 from dubins_traffic.scoring.verdict import Ruling, told_cut, was_cut
-from dubins_traffic.suites.comparing import (
+from dubins_traffic.suites.results import (
+    GameResult,
     Source,
     check_suite,
     compare_trials,
@@ -27,8 +27,7 @@ from dubins_traffic.suites.comparing import (
     shares,
     where_they_ran,
 )
-from dubins_traffic.suites.games import agrees
-from dubins_traffic.suites.results import GameResult
+from dubins_traffic.suites.running import agrees
 from dubins_traffic.suites.suite import GameEntry, Suite
 from dubins_traffic.viewer.pages import render
 
@@ -169,10 +168,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
 def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
     """Return the columns of each entry in files of results, one value a case.
 
-    Raises
-    ------
-    InputError
-        If the suite is another one here, a name stands twice, or a file has not the cases of the suite.
+    InputError if the suite is another one here, a name stands twice, or a file has not the cases of the suite.
     """
     check_suite(suite, sources)
     count = len(suite.model.cases or ())
@@ -192,13 +188,7 @@ def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
 
 
 def answers_of(suite: Suite, sources: Sequence[Source]) -> list[Answers]:
-    """Return the answers in files of results.
-
-    Raises
-    ------
-    InputError
-        If the suite is another one here, or a name stands twice.
-    """
+    """Return the answers in files of results; InputError if the suite is another one here, or a name stands twice."""
     check_suite(suite, sources)
     found: list[Answers] = []
     for source in sources:

@@ -43,10 +43,7 @@ def save_arrays(
 ) -> None:
     """Write an archive, its header first.
 
-    Raises
-    ------
-    InputError
-        If the path is refused (`files.require_output`), or the file can't be written.
+    InputError if the path is refused (`files.require_output`), or the file can't be written.
     """
     files.require_output(path, ARCHIVE, SUFFIXES, overwrite=overwrite)
     text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)

@@ -86,10 +86,7 @@ class Assumption:
     def parse(cls, words: Iterable[str]) -> Assumption:
         """Return the assumption that the words name, such as ``E1`` and ``E3:once``; what is not named is left out.
 
-        Raises
-        ------
-        InputError
-            If a word is none of ours or a part is named twice.
+        InputError if a word is none of ours or a part is named twice.
         """
         found = NOTHING
         seen: set[str] = set()

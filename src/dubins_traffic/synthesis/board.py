@@ -257,10 +257,7 @@ class Board:
     def number(self, scenes: Sequence[Scene]) -> int:
         """Return the number of the position with these scenes, one a node.
 
-        Raises
-        ------
-        KeyError
-            If it is none of the positions.
+        KeyError if it is none of the positions.
         """
         numbers = [self.scenery(n).number[scene] for n, scene in enumerate(scenes)]
         left, ego, total = self.others, 1, 0

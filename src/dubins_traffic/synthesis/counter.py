@@ -1,18 +1,25 @@
-"""Counterstrategies: how the environment keeps the ego from a goal where it can, and keeps its own assumption.
+"""Counterstrategies: how the environment keeps the ego from a goal where it can, and keeps its own assumption; and why.
 
 From a position that is lost for a goal (`solver.Loss`) the environment has, for each debt, moves that pay it after some
 turns, while the ego does not get to where it would win. The environment pays its debts in turn.
+Why a game is lost is told in words: the counterstrategy is played until it repeats, and what repeats is told.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.synthesis.arrays import Flags, Numbers
+from dubins_traffic.synthesis.arena import Arena
+from dubins_traffic.synthesis.assumption import Arriving, Leaving
+from dubins_traffic.synthesis.board import Board
+from dubins_traffic.synthesis.positions import Flags, Numbers
+from dubins_traffic.synthesis.queues import WHO
+from dubins_traffic.synthesis.routes import distances
 from dubins_traffic.synthesis.solver import Solution
 
 NEVER = np.int64(2**62)
@@ -34,13 +41,7 @@ class Counterstrategy:
     _turns: dict[tuple[int, int], Ints] = field(default_factory=dict[tuple[int, int], Ints], repr=False)
 
     def level(self, position: int) -> int:
-        """Return which of the losses a position belongs to.
-
-        Raises
-        ------
-        InputError
-            If the ego wins there.
-        """
+        """Return which of the losses a position belongs to; InputError if the ego wins there."""
         for level, loss in enumerate(self.solution.losses):
             if loss.lost[position]:
                 return level
@@ -153,3 +154,224 @@ def _edges(at: Ints, positions: Ints) -> tuple[Ints, Ints]:
     rows = np.repeat(np.arange(positions.size), sizes)
     starts = np.cumsum(sizes) - sizes
     return rows, np.arange(rows.size) - starts[rows] + at[positions][rows]
+
+
+EGO_CAR = 0
+"""The ego's place among the cars; e-agents are 1 and on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """What stands where when the environment is to move.
+
+    Attributes
+    ----------
+    cells : tuple of int
+        Of each car, the ego's first.
+    orders : dict
+        For each node the lanes in which somebody waits in the order, first first.
+    rammed : bool
+        Whether an e-agent has driven into the ego.
+    """
+
+    cells: tuple[int, ...]
+    orders: dict[int, tuple[int, ...]]
+    rammed: bool = False
+
+
+def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> list[str]:
+    """Return, line by line, how the environment keeps the ego from a goal.
+
+    Parameters
+    ----------
+    counter : Counterstrategy
+        How it plays.
+    position : int
+        A lost position; where it begins.
+    turns : int
+        After how many turns to tell what has been seen, if nothing repeats by then.
+    """
+    board = counter.solution.game.board
+    moments, again, goal = played(counter, position, turns)
+    arena = board.arena
+    name = ("goal " if goal < len(arena.goals) else "") + arena.target_name(goal)
+    lines = [f"From here the ego can be kept from {name} for ever:", *_scene_lines(arena, moments[0])]
+    if moments[-1].rammed:
+        return [
+            *lines,
+            f"After {_turns(len(moments) - 1)} an e-agent drives into the ego: E2 is not assumed.",
+        ]
+    cycle = moments[again:]
+    if again:
+        lines.append(f"After {_turns(again)} this repeats every {_turns(len(cycle), 'turn')}:")
+    else:
+        lines.append(f"This repeats every {_turns(len(cycle), 'turn')}:")
+    lines += [_ego_line(arena, cycle)]
+    return lines + [_line(board, cycle, car) for car in range(1, board.others + 1)]
+
+
+def _turns(count: int, one: str = "1 turn") -> str:
+    return one if count == 1 else f"{count} turns"
+
+
+def played(counter: Counterstrategy, position: int, turns: int) -> tuple[list[Moment], int, int]:
+    """Play against an ego that heads for the goal; return the moments, the first that recurs, and the goal."""
+    game = counter.solution.game
+    board = game.board
+    moment = moment_of(board, position)
+    moments, debt = [moment], 0
+    seen: dict[tuple[int, int], int] = {}
+    goal = counter.solution.losses[counter.level(position)].goal
+    while (position, debt) not in seen and len(moments) <= turns:
+        seen[position, debt] = len(moments) - 1
+        after, debt = counter.choose(position, debt)
+        if after == game.positions:
+            return [*moments, Moment(moment.cells, moment.orders, True)], 0, goal
+        moment = followed(board, moment, moment_of(board, after))
+        goal = counter.solution.losses[counter.level(position)].goal
+        position = _towards(counter, after, goal)
+        moment = followed(board, moment, moment_of(board, position))
+        moments.append(moment)
+    again = seen.get((position, debt), 0)
+    return moments[: len(moments) - 1] if again or len(moments) > 1 else moments, again, goal
+
+
+def _towards(counter: Counterstrategy, position: int, goal: int) -> int:
+    """Return the move of an ego that takes the shortest way to a goal, or waits."""
+    game = counter.solution.game
+    arena = game.board.arena
+    far = distances(arena, arena.targets[goal])
+    options = game.ego_to[game.ego_at[position] : game.ego_at[position + 1]].tolist()
+    return min(options, key=lambda option: (far.get(int(game.ego_cell[option]), arena.cells), option))
+
+
+def moment_of(board: Board, position: int) -> Moment:
+    """Return what stands where in a position; the e-agents sorted by cell."""
+    arena = board.arena
+    count = len(arena.nodes)
+    ego, others = -1, list[int]()
+    orders: dict[int, tuple[int, ...]] = {}
+    for n, scene in enumerate(board.scenes(position)):
+        lanes = [(count + arena.nodes[n].inbound[slot], who) for slot, who in scene.queue]
+        parked = [(count + arena.nodes[n].inbound[slot], -1) for slot in scene.parked]
+        inside = [(n, scene.inside)] if scene.inside is not None else []
+        for cell, who in lanes + parked + inside:
+            if who == WHO.EGO:
+                ego = cell
+            else:
+                others.append(cell)
+        if lanes:
+            orders[n] = tuple(cell for cell, _ in lanes)
+    return Moment((ego, *sorted(others)), orders)
+
+
+def followed(board: Board, before: Moment, after: Moment) -> Moment:
+    """Return the later moment with its e-agents named as in the earlier one, by which cell leads to which."""
+    free = list(after.cells[1:])
+    chosen: list[int] = []
+
+    def assign(car: int) -> bool:
+        if car == len(before.cells):
+            return True
+        own = before.cells[car]
+        for cell in (own, *board.arena.following(own)):
+            if cell in free:
+                free.remove(cell)
+                chosen.append(cell)
+                if assign(car + 1):
+                    return True
+                free.append(chosen.pop())
+        return False
+
+    assign(1)
+    return Moment((after.cells[0], *chosen), after.orders)
+
+
+def _scene_lines(arena: Arena, moment: Moment) -> list[str]:
+    cars = ["the ego", *(f"e-agent {car}" for car in range(1, len(moment.cells)))]
+    return [f"  {car} at {arena.name(cell)}" for car, cell in zip(cars, moment.cells, strict=True)]
+
+
+def _ego_line(arena: Arena, cycle: Sequence[Moment]) -> str:
+    cells = list(dict.fromkeys(moment.cells[EGO_CAR] for moment in cycle))
+    if len(cells) == 1:
+        return f"  the ego waits at {arena.name(cells[0])}"
+    return "  the ego goes by " + _names(arena, cells)
+
+
+def _line(board: Board, cycle: Sequence[Moment], car: int) -> str:
+    """Return what an e-agent does while all repeats, and why it need not do anything else."""
+    arena = board.arena
+    cells = list(dict.fromkeys(moment.cells[car] for moment in cycle))
+    if len(cells) > 1:
+        return f"  e-agent {car} goes by {_names(arena, cells)}"
+    cell = cells[0]
+    why = _excuse_inside(board, cycle, cell) if cell < len(arena.nodes) else _excuse_lane(board, cycle, cell)
+    return f"  e-agent {car} holds {arena.name(cell)}: {why}"
+
+
+def _excuse_inside(board: Board, cycle: Sequence[Moment], cell: int) -> str:
+    if board.assumption.leaves is Leaving.NEVER:
+        return "E4 is not assumed, so it need not leave"
+    exits = board.arena.following(cell)
+    opposite = board.arena.opposite(cell)
+    met = {moment.cells.index(opposite) for moment in cycle if opposite in moment.cells}
+    if EGO_CAR in met or (met and board.assumption.leaves is Leaving.UNMET):
+        return f"again and again {_cars(met)} {_is(met)} in the same bend"
+    for moment in cycle:
+        if all(lane in moment.cells for lane in exits):
+            holders = _cars({moment.cells.index(lane) for lane in exits})
+            return f"again and again all its exits are taken, by {holders}"
+    return "E6 is not assumed, or it leaves when it must"
+
+
+def _excuse_lane(board: Board, cycle: Sequence[Moment], cell: int) -> str:
+    arena = board.arena
+    node = arena.lane_end[cell - len(arena.nodes)][0]
+    crossing = arena.nodes[node].crossing
+    if all(cell not in moment.orders.get(node, ()) for moment in cycle):
+        return "E5 is not assumed, so it need not come to the end of the lane"
+    if not (board.assumption.enters if crossing else board.assumption.arrives is not Arriving.NEVER):
+        return f"{'E3' if crossing else 'E5'} is not assumed, so it need not enter {arena.name(node)}"
+    inside = {moment.cells.index(node) for moment in cycle if node in moment.cells}
+    ahead = {moment.cells.index(other) for moment in cycle for other in _ahead(moment, node, cell)}
+    if board.scenery(node).kind.ordered and ahead:
+        return f"again and again {_cars(ahead)} {_is(ahead)} before it in the order"
+    if inside:
+        return f"again and again {_cars(inside)} {_is(inside)} in {arena.name(node)}"
+    excuse = "" if crossing else _excuse_bend(board, cycle, node)
+    return excuse or "it gives up its place in the order again and again"
+
+
+def _excuse_bend(board: Board, cycle: Sequence[Moment], node: int) -> str:
+    """Return who excuses a car that waits before a bend or dead end, though that is clear; nothing if nobody does."""
+    opposite = board.arena.opposite(node)
+    met = {moment.cells.index(opposite) for moment in cycle if opposite in moment.cells}
+    if EGO_CAR in met:
+        return "again and again the ego is in the bend before it"
+    exits = board.arena.following(node)
+    closing = {moment.cells.index(lane) for moment in cycle for lane in exits if lane in moment.cells}
+    alone = board.assumption.arrives is Arriving.MOVES_UP
+    if EGO_CAR in closing or (closing and not alone):
+        return f"again and again {_cars(closing)} {_is(closing)} in the way out of {board.arena.name(node)}"
+    if met and not alone and board.assumption.leaves is Leaving.UNMET:
+        return f"again and again {_cars(met)} {_is(met)} in the bend before it"
+    return ""
+
+
+def _is(cars: set[int]) -> str:
+    return "is" if len(cars) == 1 else "are"
+
+
+def _ahead(moment: Moment, node: int, cell: int) -> tuple[int, ...]:
+    order = moment.orders.get(node, ())
+    return order[: order.index(cell)] if cell in order else ()
+
+
+def _cars(cars: set[int]) -> str:
+    names = ["the ego" if car == EGO_CAR else f"e-agent {car}" for car in sorted(cars)]
+    return " and ".join(names) if len(names) < 3 else ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def _names(arena: Arena, cells: Sequence[int]) -> str:
+    return ", ".join(arena.name(cell) for cell in cells)

@@ -63,10 +63,7 @@ def start_positions(board: Board, instance: Instance) -> list[int]:
 def start_cells(board: Board, instance: Instance) -> list[int]:
     """Return the cells in which the cars of an instance start, the ego first.
 
-    Raises
-    ------
-    InputError
-        If others play, or two cars start in one cell.
+    InputError if others play, or two cars start in one cell.
     """
     if len(instance.starts) != board.others + 1:
         raise InputError(

@@ -1,17 +1,27 @@
-"""Room for the moves of positions, and the numbers of positions, compiled."""
+"""Room for the moves of positions, and the numbers of positions, compiled; and the narrow arrays that hold them."""
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.kernels.records import Rows, record, table
-from dubins_traffic.synthesis.arrays import Cells, Masks, Numbers
 from dubins_traffic.synthesis.board import Board, Tables
 from dubins_traffic.synthesis.queues import SLOTS
+
+Numbers: TypeAlias = npt.NDArray[np.int32]
+"""Numbers of positions, places in lists, ranks."""
+Cells: TypeAlias = npt.NDArray[np.int16]
+"""Numbers of cells and goals."""
+Bytes: TypeAlias = npt.NDArray[np.uint8]
+Masks: TypeAlias = npt.NDArray[np.uint8 | np.int64]
+"""A bit for each e-agent that may move: bytes, unless there are more than eight."""
+Flags: TypeAlias = npt.NDArray[np.bool_]
+
 
 MOST_CHOICES = SLOTS + 1
 """Of one car: to stay, or to leave by one of four lanes."""

@@ -13,17 +13,9 @@ from typing import Final
 
 import numpy as np
 
-from dubins_traffic.synthesis.arrays import Cells, Flags, Numbers
-from dubins_traffic.synthesis.fixpoint import forced, reach
+from dubins_traffic.synthesis.fixpoint import UNRANKED, Graph, Search, forced, own, reach, reverse
 from dubins_traffic.synthesis.game import WORKERS, Game, Progress, room
-from dubins_traffic.synthesis.positions import Work
-from dubins_traffic.synthesis.search import (
-    UNRANKED,
-    Graph,
-    Search,
-    own,
-    reverse,
-)
+from dubins_traffic.synthesis.positions import Cells, Flags, Numbers, Work
 
 LOOK: Final = 0.1
 """Seconds between two looks at how far a search has come."""

@@ -16,9 +16,20 @@ from typing import Final
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.logic.exports import FORMATS, Specification
-from dubins_traffic.logic.formula import Formula, Op, conj, disj, iff, implies, negation, prop
+from dubins_traffic.logic.formula import (
+    Formula,
+    Op,
+    always,
+    conj,
+    disj,
+    eventually,
+    iff,
+    implies,
+    negation,
+    next_,
+    prop,
+)
 from dubins_traffic.logic.rewrite import simplify
-from dubins_traffic.logic.temporal import always, eventually, next_
 from dubins_traffic.synthesis.assumption import Arriving, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board
 

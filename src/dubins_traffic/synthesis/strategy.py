@@ -1,28 +1,37 @@
-"""Strategies: a rank table for each goal, kept in a file, and asked for moves.
+"""Strategies: a rank table for each goal, kept in a file, checked, and asked for moves and for advice on the road.
 
 The ego moves to the position of lowest rank for the goal it seeks; having reached it, it seeks the next. A file is a
 NumPy archive (`.npz`): `header`, JSON in UTF-8 bytes with the game and the version of the format, and for each goal k
 the arrays `rank_k`, `start_k` and `debt_k` (`solver.Ranks`).
+
+A check of the ranks goes move by move; nothing of the solver is used. Its conditions are local, and together they
+suffice. Where a goal has not been reached, whatever the environment does, the ego can get to a rank below the layer,
+or it stays in the layer and the environment owes what the layer says. Layers fall only finitely often, so a play that
+never reaches the goal stays in one layer, where one debt is owed for ever: the environment has failed. Where the goal
+has been reached, the ego stays where the next goal has ranks.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Final
+from typing import Annotated, Any, Final, Protocol
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from dubins_traffic.errors import InputError
+from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.synthesis.archive import Archive, save_arrays
 from dubins_traffic.synthesis.arena import Arena
-from dubins_traffic.synthesis.arrays import Numbers
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import MOST_OTHERS, Board
-from dubins_traffic.synthesis.game import LARGEST_CHOICE, MOST_POSITIONS, room
+from dubins_traffic.synthesis.fixpoint import NO_DEBT
+from dubins_traffic.synthesis.game import LARGEST_CHOICE, MOST_POSITIONS, Game, room
 from dubins_traffic.synthesis.moves import Work, list_moves
+from dubins_traffic.synthesis.positions import Flags, Numbers
+from dubins_traffic.synthesis.road_play import EGO_CAR, RoadPlay
 from dubins_traffic.synthesis.solver import Ranks, Solution
 
 FORMAT: Final = "dubins-traffic strategy"
@@ -54,13 +63,7 @@ class Strategy:
         return 0 <= position < self.board.positions and all(own.rank[position] >= 0 for own in self.ranks)
 
     def first(self) -> int:
-        """Return the first position from which the strategy wins.
-
-        Raises
-        ------
-        InputError
-            If there is none.
-        """
+        """Return the first position from which the strategy wins; InputError if there is none."""
         won = np.logical_and.reduce([own.rank >= 0 for own in self.ranks])
         if not won.any():
             raise InputError("a strategy that wins from nowhere", expected="some position")
@@ -69,10 +72,7 @@ class Strategy:
     def choose(self, position: int, goal: int) -> int:
         """Return the position to which the ego moves from `position`, or that itself if it stays.
 
-        Raises
-        ------
-        InputError
-            If the strategy does not win from there.
+        InputError if the strategy does not win from there.
         """
         board = self.board
         out = room(board, 1, LARGEST_CHOICE)
@@ -110,7 +110,7 @@ class Strategy:
         ------
         InputError
             If it can't be read, is no strategy, of an unknown version, or has no rank in any position for some goal.
-            Whether it wins elsewhere is for `checker.check`.
+            Whether it wins elsewhere is for `check`.
         """
         with Archive(path, "strategy") as archive:
             try:
@@ -179,3 +179,166 @@ def _header(archive: Archive) -> _Header:
         (first, *_) = error.errors(include_url=False)
         place = ".".join(str(part) for part in first["loc"])
         raise InputError("not as in a strategy", field=f"header.{place}", expected=first["msg"]) from None
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What to do at the end of a lane.
+
+    Attributes
+    ----------
+    node : int
+        The intersection ahead.
+    enter : bool
+        Whether to enter it as soon as the rules allow, or to wait.
+    exits : tuple of int
+        Lanes out that are free in the game, the best first; empty where the ego may not enter yet.
+    """
+
+    node: int
+    enter: bool
+    exits: tuple[int, ...]
+
+
+class Adviser(Protocol):
+    """Who says what to do before intersections, in one trial."""
+
+    @property
+    def board(self) -> Board:
+        """The game."""
+        ...
+
+    def wins(self, play: RoadPlay) -> bool:
+        """Say whether the strategy wins from where a play is, which has a position."""
+        ...
+
+    def advise(self, play: RoadPlay, goal: int, following: int) -> Advice | None:
+        """Return what to do; None where the ego is at no lane's end or where the strategy does not win."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Ranked:
+    """What our own strategy says, by its ranks."""
+
+    strategy: Strategy
+
+    @property
+    def board(self) -> Board:
+        """The game."""
+        return self.strategy.board
+
+    def wins(self, play: RoadPlay) -> bool:
+        """Say whether the strategy wins from where a play is."""
+        return play.position is not None and self.strategy.wins(play.position)
+
+    def advise(self, play: RoadPlay, goal: int, following: int) -> Advice | None:
+        """Return what the strategy says (`advise`)."""
+        return advise(self.strategy, play, goal, following)
+
+
+def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Advice | None:
+    """Return what the strategy says, None where the ego is at no lane's end or where it does not win.
+
+    Parameters
+    ----------
+    strategy : Strategy
+        The ego's.
+    play : RoadPlay
+        Where the play is.
+    goal, following : int
+        The goal that is sought, and the one to seek after it (places in `Arena.goals`).
+    """
+    board = strategy.board
+    nodes = len(board.arena.nodes)
+    position, cell = play.position, play.cells[EGO_CAR]
+    if position is None or cell < nodes or not strategy.wins(position):
+        return None
+    node = board.arena.lane_end[cell - nodes][0]
+    options = play.moves.of_ego(position)
+    if len(options) == 1:
+        return Advice(node, True, ())
+    inside = options[1]
+    own = strategy.ranks[goal].rank
+    after = strategy.ranks[following if own[inside] == 0 else goal].rank
+    free = [
+        lane
+        for lane in board.arena.nodes[node].exits
+        if nodes + lane not in play.cells or nodes + lane == cell
+    ]
+    ways = zip(free, play.moves.of_ego(inside)[1:], strict=True)
+    ranked = sorted((int(after[then]), lane) for lane, then in ways if after[then] >= 0)
+    enters = own[inside] >= 0 and (own[position] < 0 or own[inside] <= own[position])
+    return Advice(node, bool(enters), tuple(lane for _, lane in ranked))
+
+
+LOST = np.int32(2**31 - 1)
+"""Stands for no rank, so that less is better."""
+
+
+class StrategyError(DubinsTrafficError):
+    """A strategy does not do what it promises; the message names a position and a goal."""
+
+
+def check(game: Game, ranks: Sequence[Ranks]) -> None:
+    """Check that the ego wins by these ranks from every position that has one.
+
+    Parameters
+    ----------
+    game : Game
+        The game.
+    ranks : sequence of Ranks
+        One table a goal.
+
+    Raises
+    ------
+    StrategyError
+        If it does not: names the first position where a condition above fails.
+    """
+    for goal, own in enumerate(ranks):
+        following = ranks[(goal + 1) % len(ranks)]
+        reached = own.rank == 0
+        if (reached & ~game.at_target(goal)).any():
+            raise _error(game, goal, reached & ~game.at_target(goal), "has rank 0 away from the goal")
+        best = answers(game, own)
+        wrong = _astray(game, own, best)
+        if wrong.any():
+            raise _error(game, goal, wrong, "leads to no lower rank while nothing is owed")
+        lost = reached & (_worst(game, answers(game, following)) == LOST)
+        lost |= reached & (following.rank < 0)
+        if lost.any():
+            raise _error(game, goal, lost, "leads from the goal to where the next one is not reached")
+
+
+def answers(game: Game, ranks: Ranks) -> Numbers:
+    """Return the lowest rank (N+1,) to which the ego can get from each position in its turn, or `LOST`."""
+    worth = np.where(ranks.rank < 0, LOST, ranks.rank)
+    lowest = np.minimum.reduceat(worth[game.ego_to], game.ego_at[:-1])
+    return np.append(lowest, LOST).astype(np.int32)
+
+
+def _astray(game: Game, ranks: Ranks, best: Numbers) -> Flags:
+    """Return where (N,) a rank promises what the moves don't keep."""
+    count = game.positions
+    held = ranks.rank > 0
+    layer = np.where(held, ranks.rank, 0)
+    below = np.where(held, np.append(ranks.start, LOST)[layer], LOST)
+    debt = np.where(held, np.append(ranks.debt, NO_DEBT)[layer], NO_DEBT).astype(np.int16)
+    owner = np.repeat(np.arange(count), np.diff(game.owed_at))
+    owing = np.zeros(count, dtype=np.bool_)
+    owing[owner[game.owed == debt[owner]]] = True
+    after = np.searchsorted(ranks.start, ranks.start, side="right").astype(np.int32)
+    bound = np.where(owing, np.append(after, LOST)[layer], below)
+    return held & (_worst(game, best) >= bound)
+
+
+def _worst(game: Game, best: Numbers) -> Numbers:
+    """Return the highest of `best` (N+1,) to which the environment can bring the ego from each position (N,)."""
+    worst = [np.maximum.reduceat(best[turns.to], turns.at[:-1]) for turns in game.turns()]
+    return np.concatenate(worst)
+
+
+def _error(game: Game, goal: int, wrong: Flags, fault: str) -> StrategyError:
+    position = int(np.flatnonzero(wrong)[0])
+    name = game.board.arena.target_name(goal)
+    return StrategyError(f"position {position}, on the way to {name}: {fault} ({int(wrong.sum())} such)")

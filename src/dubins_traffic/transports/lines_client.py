@@ -8,7 +8,7 @@ from typing import Any, cast
 
 from dubins_traffic.problem.public_problem import problem_from_document
 from dubins_traffic.protocols import Closes, Controller
-from dubins_traffic.transports.observed import observation_from_document
+from dubins_traffic.transports.line_messages import observation_from_document
 
 PATIENCE = 120.0
 

@@ -1,24 +1,42 @@
-"""One session's dealings with all remote drivers: frames out, commands in, and names for what goes wrong."""
+"""One session's dealings with all remote drivers: frames out, commands in, and names for what goes wrong.
+
+Where states are shown more often than once a tick, those between two frames are made here, and what each car sees.
+Remote cars are what a trial knows: the ego a Controller, e-agents a Driver.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from time import monotonic
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self
 
-from dubins_traffic.cars.state import Labels, Observation, State
-from dubins_traffic.errors import PeerError
+import numpy as np
+
+from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
+from dubins_traffic.errors import InputError, PeerError
+from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.protocols import Clock, End, Ending, Looks, Polled, Streams, Transport, View
-from dubins_traffic.transports.inbox import Inbox, Slot
-from dubins_traffic.transports.patience import Patience
-from dubins_traffic.transports.punctuality import Punctuality
-from dubins_traffic.transports.shown import Sights, between, kept, onward
+from dubins_traffic.protocols import (
+    Clock,
+    Closes,
+    Controller,
+    End,
+    Ending,
+    Looks,
+    Polled,
+    Reports,
+    Streams,
+    Transport,
+    View,
+)
+from dubins_traffic.transports.clocks import Patience
+from dubins_traffic.transports.inbox import Inbox, Punctuality, Slot
 
 if TYPE_CHECKING:
-    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.problem.instance import Instance, Problem
 
 EGO_NAME = "ego"
 IDLE = 0.1
@@ -348,3 +366,153 @@ class Link:
     def _view(self, state: State, elapsed: float, observe: Callable[[int], Observation]) -> View:
         time = self._tick / self._instance.problem.rate + elapsed
         return View(self._tick, time, state, self._labels, observe, self._running)
+
+
+SIGHT = 1e150
+"""Sensing radius of remote e-agents, metres: they see everything."""
+
+
+def kept(state: State, labels: Labels) -> tuple[State, Labels]:
+    """Return copies of arrays that belong to others and change with the next tick."""
+    return State(*(column.copy() for column in state)), Labels(*(row.copy() for row in labels))
+
+
+def between(before: State, after: State, share: float) -> State:
+    """Return the state at `share` (0 to 1) of the way from one frame to the next.
+
+    Within a tick of 1/30 s the chord of a car's arc is less than 0.1 mm from it.
+    """
+    x, y, c, s = (
+        first + share * (last - first)
+        for first, last in (
+            (before.x, after.x),
+            (before.y, after.y),
+            (before.c, after.c),
+            (before.s, after.s),
+        )
+    )
+    length = np.hypot(c, s)
+    return State(x, y, c / length, s / length, after.speed, after.yaw_rate, after.count)
+
+
+def onward(before: State, seconds: float) -> State:
+    """Return where the cars are `seconds` after a frame if they go on as they are."""
+    if seconds <= 0.0:
+        return before
+    way, turn = before.speed * seconds, before.yaw_rate * seconds
+    cosine, sine = np.cos(turn), np.sin(turn)
+    c, s = before.c * cosine - before.s * sine, before.s * cosine + before.c * sine
+    half_c, half_s = before.c + c, before.s + s
+    length = np.hypot(half_c, half_s)
+    x, y = before.x + way * half_c / length, before.y + way * half_s / length
+    return State(x, y, c, s, before.speed, before.yaw_rate, before.count)
+
+
+class Sights:
+    """What each car of one trial sees.
+
+    Parameters
+    ----------
+    instance : Instance
+        The instance of the trial.
+    """
+
+    def __init__(self, instance: Instance) -> None:
+        self._instance = instance
+        self._senses: dict[int, Senses] = {}
+
+    def take(self, tick: int, state: State, labels: Labels, own: Callable[[], Observation]) -> None:
+        """Take the next frame; `own` returns the ego's observation of it."""
+        self._tick, self._state, self._labels, self._own = tick, state, labels, own
+        self._seen: dict[int, Observation] = {}
+
+    def observe(self, car: int) -> Observation:
+        """Return the observation of `car` in the present frame; the ego's is the trial's own."""
+        if car == EGO:
+            return self._own()
+        if car not in self._seen:
+            self._seen[car] = self.sense(car, self._state)
+        return self._seen[car]
+
+    def sense(self, car: int, state: State) -> Observation:
+        """Return what `car` sees in `state`, which lies between the present frame and the next."""
+        if car not in self._senses:
+            self._senses[car] = Senses(self._instance, car, None if car == EGO else SIGHT)
+        return self._senses[car].observe(self._tick, state, self._labels)
+
+
+class RemoteController:
+    """The ego's driver, elsewhere (a `protocols.Controller`)."""
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+
+    def start(self, problem: Problem) -> None:  # noqa: ARG002  # the link has the whole instance
+        """Announce the problem and wait for the first command: the time to begin."""
+        self._link.announce()
+
+    def act(self, observation: Observation) -> Command:
+        """Return the command that answers the frame just shown."""
+        return Command(*self._link.command(EGO_NAME, observation.tick))
+
+
+class LocalController:
+    """A controller in this process of a trial that others see or drive in: its link learns when the trial begins."""
+
+    def __init__(self, link: Link, controller: Controller) -> None:
+        self._link, self._controller = link, controller
+        self.act = controller.act
+
+    def start(self, problem: Problem) -> None:
+        """Start the controller, then the trial."""
+        self._controller.start(problem)
+        self._link.announce()
+
+    def report(self) -> Sequence[tuple[str, str]]:
+        """Return what the controller has to say."""
+        return self._controller.report() if isinstance(self._controller, Reports) else ()
+
+    def close(self) -> None:
+        """Close the controller if it wants to be closed."""
+        if isinstance(self._controller, Closes):
+            self._controller.close()
+
+
+class RemoteAgents:
+    """The e-agents of kind `remote`, elsewhere (a `protocols.Driver`).
+
+    Whatever a peer does wrong is an `agent_fault` that begins with the car's name and the name of the fault.
+    """
+
+    def __init__(self, link: Link) -> None:
+        self._link = link
+
+    def __deepcopy__(self, memo: object) -> Self:
+        """Refuse: a program elsewhere drives in one trial at a time."""
+        raise InputError(
+            "a program elsewhere can't go on in two trials",
+            field="e-agents",
+            value=[name for _, name in self._cars],
+            expected="e-agents of types of ours, to fork a trial",
+        )
+
+    def reset(self, instances: Sequence[Instance], state: State) -> None:  # noqa: ARG002  # nothing to begin with
+        """Note which cars these are; a link drives one trial at a time."""
+        (instance,) = instances
+        self._cars = [
+            (n, agent.name) for n, agent in enumerate(instance.e_agents, start=1) if agent.kind == REMOTE
+        ]
+
+    def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:  # noqa: ARG002
+        """Write the commands of the remote e-agents."""
+        self._link.announce()
+        for n, car in self._cars:
+            try:
+                commands[0, n] = self._link.command(car, tick)
+            except PeerError as error:
+                if error.reason in _OF_ALL:
+                    raise
+                raise PeerError(End.AGENT_FAULT.value, f"{car}: {error.reason}: {error.detail}") from error
+
+
+_OF_ALL = frozenset({End.RESET, End.TRANSPORT_LOST, End.WORLD_LOST, End.INTERRUPTED})

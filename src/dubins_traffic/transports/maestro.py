@@ -1,10 +1,13 @@
-"""The modes of 2016: who may start a trial, and when (docs/design/040-transports.md)."""
+"""Maestros: ours, with the modes of 2016 (docs/design/040-transports.md), and one that is not ours."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from enum import Enum, IntEnum
-from threading import Condition
+from threading import Condition, Lock
+
+from dubins_traffic.errors import TransportError
 
 
 class Mode(IntEnum):
@@ -122,3 +125,54 @@ class Maestro:
             self._next = Next.REPEAT
             return True, "restart asked for"
         return (None if self._next in (Next.DRAW, Next.REPEAT) else False), None
+
+
+class ForeignMaestro:
+    """What another maestro tells, from any thread: problems, and the ends of trials.
+
+    A problem is told once and taken once; an empty text ends the trial that runs, and takes back a problem that nobody
+    has taken.
+    """
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._told: str | None = None
+        self._text = ""
+        self._over = True
+        self.news: Callable[[], None] = lambda: None
+        """Called when a problem has been told, or a trial is over."""
+
+    def tell(self, text: str) -> None:
+        """Take what the maestro has published; what it publishes twice counts once."""
+        with self._lock:
+            if text == self._text:
+                return
+            self._text = text
+            self._told, self._over = (text, False) if text else (None, True)
+        self.news()
+
+    @property
+    def asks(self) -> bool:
+        """Whether there is a problem that nobody has taken."""
+        return self._told is not None
+
+    @property
+    def over(self) -> bool:
+        """Whether no trial runs, for the maestro."""
+        return self._over
+
+    def take(self) -> str | None:
+        """Return the problem that has been told, once."""
+        with self._lock:
+            told, self._told = self._told, None
+        return told
+
+
+@contextmanager
+def closing_if_refused(close: Callable[[], None]) -> Generator[None]:
+    """Call `close` if the body raises TransportError, which goes on."""
+    try:
+        yield
+    except TransportError:
+        close()
+        raise

@@ -17,9 +17,15 @@ from typing import TYPE_CHECKING, Any, Protocol
 from dubins_traffic.errors import TransportError
 from dubins_traffic.problem.public_problem import problem_to_document
 from dubins_traffic.protocols import End, Ending, Mailbox, View
-from dubins_traffic.transports.answers import LONGEST, AnswerError, command_of, garbage, message_in
+from dubins_traffic.transports.line_messages import (
+    LONGEST,
+    AnswerError,
+    command_of,
+    garbage,
+    message_in,
+    observation_to_document,
+)
 from dubins_traffic.transports.lines import BACKLOG, as_line
-from dubins_traffic.transports.observed import observation_to_document
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance

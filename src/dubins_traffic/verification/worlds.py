@@ -1,21 +1,92 @@
-"""Simulators and drivers that play a record, for running its trial again."""
+"""The worlds of a record: who plays its cars again, where bodies overlap, and labels and contacts found from poses."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations, product
+from math import hypot
 from typing import Final
 
 import numpy as np
 
 from dubins_traffic.cars.clip_and_move import clip, rows
-from dubins_traffic.cars.state import Contact, Frames, Labels, State
+from dubins_traffic.cars.motion import PARTED
+from dubins_traffic.cars.state import EGO, Contact, Frames, Labels, State
 from dubins_traffic.cars.tables import pack_cars
-from dubins_traffic.cars.touching import Touching
+from dubins_traffic.cars.touching import Bodies, Touching
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.protocols import Capabilities
+from dubins_traffic.problem.parts import Disturbances
+from dubins_traffic.protocols import Capabilities, Ending
+from dubins_traffic.record.reader import Record
+from dubins_traffic.scoring.blocks import joined
 from dubins_traffic.simulators.embedded import Embedded
-from dubins_traffic.verification.bodies import Meetings, put_frame
+from dubins_traffic.trial.trial import Trial
+from dubins_traffic.verification.result import OURS
+
+POSES: Final = ("x", "y", "c", "s", "speed", "yaw_rate")
+
+
+def put_frame(state: State, frames: Frames, f: int) -> None:
+    """Write frame f of a record into trial 0 of `state`."""
+    for name in POSES:
+        getattr(state, name)[0] = getattr(frames, name)[f]
+
+
+class Meetings:
+    """The pairs of bodies that are near each other in the frames of a trial, and those that have touched.
+
+    Parameters
+    ----------
+    instance : Instance
+        What bodies there are; obstacle k is number -1 - k.
+    frames : Frames
+        All frames of the trial.
+    """
+
+    def __init__(self, instance: Instance, frames: Frames) -> None:
+        problem = instance.problem
+        self.bodies = Bodies(problem.car, problem.obstacles)
+        self._near: dict[int, list[tuple[int, int]]] = {}
+        self._touching: set[tuple[int, int]] = set()
+        self._collect(frames)
+
+    def note(self, contacts: tuple[Contact, ...]) -> None:
+        """Take the contacts of the next frame: two bodies that touch count as one meeting until they have parted."""
+        self._touching.update((contact.car, contact.other) for contact in contacts)
+
+    def gaps(self, f: int, state: State) -> Iterator[tuple[tuple[int, int], float]]:
+        """Yield each pair that is near in frame f, whose state is given, and the gap between the bodies, metres.
+
+        Pairs that have touched and not parted since are left out.
+        """
+        near = self._near.get(f, [])
+        self._touching.intersection_update(near)
+        for pair in near:
+            gap = self.bodies.separation(state, *pair)[0]
+            if gap > PARTED:
+                self._touching.discard(pair)
+            if pair not in self._touching:
+                yield pair, gap
+
+    def _collect(self, frames: Frames) -> None:
+        reach = self.bodies.reach + 0.5 * PARTED
+        for car, other in combinations(range(frames.x.shape[1]), 2):
+            dx, dy = frames.x[:, car] - frames.x[:, other], frames.y[:, car] - frames.y[:, other]
+            self._add((car, other), dx * dx + dy * dy <= (2.0 * reach) ** 2)
+        for car, (number, parts) in product(range(frames.x.shape[1]), self.bodies.parts.items()):
+            close = np.zeros(len(frames), dtype=bool)
+            for part in parts:
+                far = reach + PARTED + hypot(part[4], part[5]) + part[6]
+                dx, dy = frames.x[:, car] - part[0], frames.y[:, car] - part[1]
+                close |= dx * dx + dy * dy <= far * far
+            self._add((car, number), close)
+
+    def _add(self, pair: tuple[int, int], close: Floats | np.ndarray) -> None:
+        for f in np.flatnonzero(close).tolist():
+            self._near.setdefault(f, []).append(pair)
+
 
 ROUNDING: Final = 1e-9
 """Largest difference between commands as clipped here and by the world of another program, m/s and rad/s."""
@@ -147,3 +218,44 @@ def by_tick(contacts: Sequence[Contact]) -> dict[int, list[Contact]]:
     for contact in contacts:
         found.setdefault(contact.tick, []).append(contact)
     return found
+
+
+def from_poses(record: Record) -> Record:
+    """Return a record with the labels and contacts that follow from its poses and commands.
+
+    In a world of ours every tick begins at its recorded frame and is moved by the recorded commands: what touches on
+    the way is a contact. Bodies that overlap in a frame touch there, in any world, unless they have touched already.
+    Contacts of a world that is not ours are kept beside these. What follows the end of the trial is left out.
+    """
+    if len(record.frames) < 2:
+        return record
+    frames = record.frames
+    ours = record.instance.simulator == OURS
+    world = FromPoses(frames, Embedded() if ours else Shown(frames), OVERLAP if ours else 0.0)
+    instance = replace(record.instance, disturbances=Disturbances())
+    kept = _Kept()
+    others = Replayed(frames, range(1, len(instance.names)))
+    trial = Trial(instance, simulator=world, agents=[others], sinks=[kept])
+    rows: list[list[float]] = commands_of(frames)[:, EGO].tolist()
+    for speed, yaw_rate in rows:
+        if trial.ending is not None:
+            break
+        trial.advance((speed, yaw_rate))
+    trial.close()
+    found = replace(joined(kept.blocks), events=frames.events)
+    return replace(record, frames=found, blocks=(found,))
+
+
+class _Kept:
+    """A sink that keeps all frames."""
+
+    def begin(self, instance: Instance) -> None:  # noqa: ARG002  # all frames are kept alike
+        """Do nothing: no frame has come yet."""
+        self.blocks: list[Frames] = []
+
+    def frames(self, frames: Frames) -> None:
+        """Keep a block."""
+        self.blocks.append(frames)
+
+    def end(self, ending: Ending) -> None:
+        """Do nothing."""

@@ -1,27 +1,149 @@
-"""Writing the report of a campaign: its page, its numbers as CSV, and the replays of its worst trials."""
+"""Writing the report of a campaign: its page, its numbers as CSV and in a terminal, and replays of its worst trials.
+
+The page is self-contained HTML, except for the replays beside it, to which it links.
+"""
 
 from __future__ import annotations
 
 import csv
 import io
 import os
+import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import manifest, rows, table
 from dubins_traffic.campaign.campaign import Campaign
-from dubins_traffic.campaign.report.comparison import Comparison, compare
-from dubins_traffic.campaign.report.page import page
+from dubins_traffic.campaign.report import plots
+from dubins_traffic.campaign.report.comparison import Comparison, compare, shown, words
 from dubins_traffic.campaign.report.plots import figures
 from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share, distributions, share
 from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, require_output, write_text
-from dubins_traffic.viewer.pages import PAGES
+from dubins_traffic.rules.clauses import clause
+from dubins_traffic.scoring.notice import assumption_notice
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, told_cut
+from dubins_traffic.viewer.pages import PAGES, render
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+MINUS = "\N{MINUS SIGN}"
+
+
+def page(comparison: Comparison, manifest: Mapping[str, Any], worst: Mapping[str, Sequence[Bad]]) -> str:
+    """Return the page; equal arguments give equal text.
+
+    Parameters
+    ----------
+    comparison : Comparison
+        What it says.
+    manifest : Mapping
+        The manifest of the campaign: versions and hashes.
+    worst : Mapping
+        The worst trials of each controller.
+    """
+    standings = comparison.standings
+    carried = list(dict.fromkeys(name for own in standings for name in own.formulas))
+    return render(
+        "campaign/report/report.html",
+        title=comparison.campaign.model.name,
+        comparison=comparison,
+        standings=standings,
+        told=_facts(comparison),
+        missing=comparison.total - comparison.trials,
+        notice=assumption_notice(comparison.broken, comparison.judged),
+        colours=[plots.colour(k) for k in range(len(comparison.controllers))],
+        dark=plots.DARK,
+        overview=_overview(comparison),
+        no_faults=plots.no_faults(comparison),
+        verdicts=list(plots.VERDICTS),
+        faults=list(plots.FAULTS),
+        by_fault=[f"fault of {who}" for who in plots.FAULTS],
+        ended="ended by the controller",
+        held=list(plots.FORMULA),
+        formulas={name: [own for own in standings if name in own.formulas] for name in carried},
+        formula_charts=[(f"Verdicts on {name}", plots.formula(comparison, name)) for name in carried],
+        pairs=list(dict.fromkeys((one.first, one.second) for one in comparison.differences)),
+        factors=[_against(comparison, factor) for factor in comparison.factors],
+        worst=worst,
+        shares=_shown_shares(comparison),
+        made=_made(manifest),
+        number=_number,
+        words=words,
+        told_cut=told_cut,
+    )
+
+
+def _facts(comparison: Comparison) -> list[str]:
+    campaign = comparison.campaign
+    cells = len(campaign.cells)
+    return [
+        f"{comparison.trials:,} trials",
+        f"{len(campaign.controllers)} controllers",
+        f"{cells} combination{'s' if cells > 1 else ''} of configuration and factors",
+        f"seed {campaign.model.seed}",
+    ]
+
+
+def _overview(comparison: Comparison) -> list[tuple[str, str]]:
+    charts: list[tuple[str, str]] = []
+    if any(standing.verdicts for standing in comparison.standings):
+        charts.append(("Shares of the verdicts", plots.verdicts(comparison)))
+    if not plots.no_faults(comparison):
+        charts.append(("Collisions by fault", plots.faults(comparison)))
+    return charts
+
+
+def _against(comparison: Comparison, factor: str) -> tuple[str, list[tuple[str, str]], list[Any]]:
+    """Return a factor, the charts against it, and the metrics that have none: 0 or absent everywhere."""
+    silent = [metric for metric in comparison.metrics if plots.says_nothing(comparison, factor, metric)]
+    charts = [
+        (f"{metric.heading} against {words(factor)}", plots.against(comparison, factor, metric))
+        for metric in comparison.metrics
+        if metric not in silent
+    ]
+    return factor, charts, silent
+
+
+def _shown_shares(comparison: Comparison) -> list[tuple[str, list[str], list[str], list[Any], str]]:
+    """Return tables of shares: heading, what is counted, the same in words, shares by controller, the clauses."""
+    standings = comparison.standings
+    groups = {
+        "Trials in which the ego broke a rule": [own.broken for own in standings],
+        "Trials in which others broke the assumption": [own.fallen for own in standings],
+        "Ends of all trials": [own.ends for own in standings],
+    }
+    found: list[tuple[str, list[str], list[str], list[Any], str]] = []
+    for title, shares in groups.items():
+        names = list(dict.fromkeys(name for group in shares for name in group))
+        cited = ", ".join(clause(name) for name in names if name in (*EGO_RULES, *ASSUMPTIONS))
+        if names:
+            heads = [words(name) for name in names]
+            found.append((title, names, heads, list(zip(standings, shares, strict=True)), cited))
+    return found
+
+
+def _made(manifest: Mapping[str, Any]) -> dict[str, str]:
+    return {
+        **manifest["versions"],
+        "campaign file": manifest["campaign"],
+        **{f"configuration {name}": digest for name, digest in manifest["configurations"].items()},
+        **{f"controller {one['name']}": one["file"] for one in manifest["controllers"] if one["file"]},
+        "code": manifest["code"],
+    }
+
+
+def _number(value: float | None, signed: bool = False) -> str:
+    return (
+        f"+{shown(value)}" if signed and value is not None and value > 0 else shown(value).replace("-", MINUS)
+    )
+
 
 ESTIMATE = ("count", "mean", "mean_low", "mean_high", "median", "median_low", "median_high")
 SHARE = ("count", "of", "share", "low", "high")
@@ -231,3 +353,97 @@ def _csv_text(headings: Sequence[str], rows: Iterator[Sequence[object]]) -> str:
     writer.writerow(headings)
     writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
     return stream.getvalue()
+
+
+def tables(comparison: Comparison) -> Iterator[Table]:
+    """Return the tables that are printed: metrics, paired differences, verdicts and faults; they fit 80 columns."""
+    yield _metric_table(comparison)
+    if comparison.differences:
+        yield _difference_table(comparison)
+    yield _share_table(comparison)
+
+
+def worst_lines(worst: Mapping[str, Sequence[Bad]], folder: str) -> Iterator[str]:
+    """Return what is said of the worst trials of a campaign in `folder`: two lines each, the second a command."""
+    for controller, trials in worst.items():
+        for bad in trials:
+            row = bad.row
+            place = ", ".join(
+                [row["configuration"], *bad.factors, f"trial {row['trial']} of seed {row['seed']}"]
+            )
+            note = f" ({bad.note})" if bad.note else ""
+            yield f"{controller}, {place}: {bad.why}{note}"
+            yield f"    dubins-traffic campaign replay {shlex.quote(folder)} {row['number']}"
+
+
+def _metric_table(comparison: Comparison) -> Table:
+    table = _table(f"{comparison.campaign.model.name}: {comparison.trials} of {comparison.total} trials")
+    _columns(table, ("metric", "controller"), ("mean", "95 %", "median", "95 %"))
+    for metric in comparison.metrics:
+        for k, standing in enumerate(comparison.standings):
+            one = standing.estimates[metric.name]
+            mean = (shown(one.mean), _interval(one.mean_interval))
+            median = (shown(one.median), _interval(one.median_interval))
+            table.add_row(metric.heading if k == 0 else "", standing.controller, *mean, *median)
+    for metric in comparison.undefined:
+        table.add_row(metric.heading, "", "not defined", "", "", "")
+    return table
+
+
+def _difference_table(comparison: Comparison) -> Table:
+    table = _table("differences on the same instances; in bold those whose interval leaves out 0")
+    _columns(table, ("metric", "controllers"), ("mean", "95 %", "more", "less"))
+    for one in comparison.differences:
+        interval = _interval(one.estimate.mean_interval)
+        numbers = (shown(one.estimate.mean), interval, str(one.larger), str(one.smaller))
+        pair = f"{one.first} - {one.second}"
+        table.add_row(one.metric.heading, pair, *numbers, style="bold" if one.is_decided else "")
+    return table
+
+
+def _share_table(comparison: Comparison) -> Table:
+    table = _table("clean, verdicts, ends, collisions by fault, formulas")
+    _columns(table, ("what", "controller"), ("trials", "share", "95 %"))
+    for standing in comparison.standings:
+        judged = {"clean": standing.clean} if standing.judged else {}
+        near = {"excused, near": standing.near} if standing.near.total else {}
+        ended = {"ended by the controller": standing.ended} if standing.ended.count else {}
+        for name, counted in {**judged, **standing.verdicts, **near, **ended, **standing.ends}.items():
+            table.add_row(words(name), standing.controller, str(counted.count), *_share_cell(counted))
+        if standing.cut:
+            table.add_row("cut", standing.controller, str(standing.cut), "", "")
+        for who, count in standing.faults.items():
+            table.add_row(f"fault of {who}", standing.controller, str(count), "", "")
+        for name, found in standing.formulas.items():
+            for verdict, counted in found.items():
+                table.add_row(
+                    f"{name}: {verdict}", standing.controller, str(counted.count), *_share_cell(counted)
+                )
+    return table
+
+
+def _table(title: str) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    return Table(
+        box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, title=title, title_justify="left"
+    )
+
+
+def _columns(table: Table, names: tuple[str, ...], numbers: tuple[str, ...]) -> None:
+    for name in names:
+        table.add_column(name, overflow="fold")
+    for name in numbers:
+        table.add_column(name, justify="right", no_wrap=True)
+
+
+def _interval(interval: Interval | None) -> str:
+    return "" if interval is None else f"{shown(interval[0])} .. {shown(interval[1])}"
+
+
+def _share_cell(share: Share) -> tuple[str, str]:
+    if share.share is None or share.interval is None:
+        return shown(None), ""
+    low, high = share.interval
+    return f"{share.share:.1%}", f"{low:.1%} .. {high:.1%}"

@@ -4,11 +4,7 @@
 the suite would not notice that the layer is gone.
 """
 
-from dubins_traffic.sandbox.attacks.attack import Attack
-from dubins_traffic.sandbox.attacks.bombs import BOMBS
-from dubins_traffic.sandbox.attacks.calls import CALLS
-from dubins_traffic.sandbox.attacks.lies import LIES
-from dubins_traffic.sandbox.attacks.reach import REACH
+from dubins_traffic.sandbox.attacks.attack import BOMBS, CALLS, LIES, REACH, Attack
 
 ATTACKS: tuple[Attack, ...] = (*REACH, *CALLS, *BOMBS, *LIES)
 """All of them."""

@@ -1,22 +1,23 @@
-"""The API of participants: what the pages show, as JSON, by a token."""
+"""The API of participants: what the pages show, as JSON, by a token; and numbers for Prometheus."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Annotated, Any
 
-from litestar import Controller, Response, get, post
+from litestar import Controller, MediaType, Response, get, post
 from litestar.datastructures import UploadFile
+from litestar.exceptions import NotAuthorizedException
 from litestar.params import MultipartBody, PathParameter
-from sqlalchemy import select
+from prometheus_client import CollectorRegistry, Gauge, generate_latest
+from sqlalchemy import func, select
 
 from dubins_traffic.service import receiving, standings, viewing
-from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.tables import Competition
-from dubins_traffic.service.web import bodies
-from dubins_traffic.service.web import viewer as who
-from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
+from dubins_traffic.service.service import Service, competition_of
+from dubins_traffic.service.tables import Competition, Submission
+from dubins_traffic.service.web import requests
+from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
 
 Name = Annotated[str, PathParameter(pattern="^[a-z0-9-]{1,60}$")]
 Number = Annotated[int, PathParameter(ge=1, le=2**31 - 1)]
@@ -36,44 +37,44 @@ class Api(Controller):
     tags = ["participants"]  # noqa: RUF012
 
     @get("/status", sync_to_thread=True)
-    def status(self, office: OfficeHere) -> dict[str, Any]:
+    def status(self, service: ServiceHere) -> dict[str, Any]:
         """Return how long the queue is, and how many workers there are."""
-        with office.database.reading() as session:
-            return viewing.told_status(office, session)
+        with service.database.reading() as session:
+            return viewing.told_status(service, session)
 
     @get("/competitions", sync_to_thread=True)
-    def competitions(self, office: OfficeHere) -> list[dict[str, Any]]:
+    def competitions(self, service: ServiceHere) -> list[dict[str, Any]]:
         """Return all competitions."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             rows = session.scalars(select(Competition).order_by(Competition.id)).all()
-            return [viewing.told_competition(office, row) for row in rows]
+            return [viewing.told_competition(service, row) for row in rows]
 
     @get("/competitions/{slug:str}", sync_to_thread=True)
-    def competition(self, office: OfficeHere, slug: Name) -> dict[str, Any]:
+    def competition(self, service: ServiceHere, slug: Name) -> dict[str, Any]:
         """Return a competition and its phases."""
-        with office.database.reading() as session:
-            return viewing.told_competition(office, _found(session, slug))
+        with service.database.reading() as session:
+            return viewing.told_competition(service, _found(session, slug))
 
     @get("/competitions/{slug:str}/file", sync_to_thread=True)
-    def file(self, office: OfficeHere, slug: Name) -> dict[str, Any]:
+    def file(self, service: ServiceHere, slug: Name) -> dict[str, Any]:
         """Return the competition file with its configurations written in, so that it can be evaluated at home."""
-        with office.database.reading() as session:
-            return dict(office.competition(_found(session, slug)).document)
+        with service.database.reading() as session:
+            return dict(service.competition(_found(session, slug)).document)
 
     @get("/competitions/{slug:str}/phases/{name:str}/table", sync_to_thread=True)
-    def table(self, office: OfficeHere, viewer: ViewerHere, slug: Name, name: Name) -> list[dict[str, Any]]:
+    def table(self, service: ServiceHere, viewer: ViewerHere, slug: Name, name: Name) -> list[dict[str, Any]]:
         """Return the table of a phase, as far as it may be seen."""
-        at = office.clock()
-        with office.database.reading() as session:
+        at = service.clock()
+        with service.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
             if not viewing.sees_table(row, viewer.account, at):
                 return []
-            latest = standings.latest_standing(session, row, office.hiding(row))
+            latest = standings.latest_standing(session, row, service.hiding(row))
             if viewer.organiser or row.is_closed(at):
                 return [] if latest is None else list(latest.places)
-            return standings.shown_table(office.phase(row), latest)
+            return standings.shown_table(service.phase(row), latest)
 
-    @get("/account", sync_to_thread=True, guards=[who.person])
+    @get("/account", sync_to_thread=True, guards=[requests.person])
     def account(self, viewer: ViewerHere) -> dict[str, Any]:
         """Return whose token this is."""
         return {
@@ -82,28 +83,32 @@ class Api(Controller):
             "team": viewer.team and viewer.team.name,
         }
 
-    @get("/competitions/{slug:str}/phases/{name:str}/submissions", sync_to_thread=True, guards=[who.person])
+    @get(
+        "/competitions/{slug:str}/phases/{name:str}/submissions",
+        sync_to_thread=True,
+        guards=[requests.person],
+    )
     def submissions(
-        self, office: OfficeHere, viewer: ViewerHere, slug: Name, name: Name
+        self, service: ServiceHere, viewer: ViewerHere, slug: Name, name: Name
     ) -> list[dict[str, Any]]:
         """Return the submissions of the own team to a phase, newest first."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
             if viewer.person.team_id is None:
                 return []
             places = viewing.places_of(session)
             found = receiving.submissions_of(session, row, viewer.person.team_id)
-            return [viewing.told_submission(office, session, one, viewer.person, places) for one in found]
+            return [viewing.told_submission(service, session, one, viewer.person, places) for one in found]
 
     @post(
         "/competitions/{slug:str}/phases/{name:str}/submissions",
         sync_to_thread=True,
-        guards=[who.person],
-        opt={bodies.FILES: True},
+        guards=[requests.person],
+        opt={requests.FILES: True},
     )
     def submit(
         self,
-        office: OfficeHere,
+        service: ServiceHere,
         viewer: ViewerHere,
         slug: Name,
         name: Name,
@@ -111,30 +116,30 @@ class Api(Controller):
     ) -> Response[dict[str, Any]]:
         """Hand in a submission; the same bytes again are the same submission, with status 200."""
         sent = data.file.file.read()
-        number, new = receiving.take_in(office, viewer.person, slug, name, data.file.filename, sent)
-        return Response(_view(office, viewer, number), status_code=201 if new else 200)
+        number, new = receiving.take_in(service, viewer.person, slug, name, data.file.filename, sent)
+        return Response(_view(service, viewer, number), status_code=201 if new else 200)
 
-    @get("/submissions/{number:int}", sync_to_thread=True, guards=[who.person])
-    def submission(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
+    @get("/submissions/{number:int}", sync_to_thread=True, guards=[requests.person])
+    def submission(self, service: ServiceHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Return what may be seen of a submission."""
-        return _view(office, viewer, number)
+        return _view(service, viewer, number)
 
-    @post("/submissions/{number:int}/cancel", sync_to_thread=True, guards=[who.person], status_code=200)
-    def cancel(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
+    @post("/submissions/{number:int}/cancel", sync_to_thread=True, guards=[requests.person], status_code=200)
+    def cancel(self, service: ServiceHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Cancel a submission."""
-        receiving.cancel(office, viewer.person, number)
-        return _view(office, viewer, number)
+        receiving.cancel(service, viewer.person, number)
+        return _view(service, viewer, number)
 
-    @post("/submissions/{number:int}/name", sync_to_thread=True, guards=[who.person], status_code=200)
-    def name(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
+    @post("/submissions/{number:int}/name", sync_to_thread=True, guards=[requests.person], status_code=200)
+    def name(self, service: ServiceHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Let a submission be the one of its team that counts."""
-        receiving.name_it(office, viewer.person, number)
-        return _view(office, viewer, number)
+        receiving.name_it(service, viewer.person, number)
+        return _view(service, viewer, number)
 
-    @get("/submissions/{number:int}/logs", sync_to_thread=True, guards=[who.person])
-    def logs(self, office: OfficeHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
+    @get("/submissions/{number:int}/logs", sync_to_thread=True, guards=[requests.person])
+    def logs(self, service: ServiceHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Return the logs of a submission that may be seen: of all trials, or the tail of one."""
-        told = _view(office, viewer, number)
+        told = _view(service, viewer, number)
         if "trials" in told:
             return {"trials": [{"number": own["number"], "log": own["log"]} for own in told["trials"]]}
         return {"log": told.get("log", "")}
@@ -147,7 +152,26 @@ def _found(session: viewing.Session, slug: str) -> Competition:
     return row
 
 
-def _view(office: Office, viewer: Viewer, number: int) -> dict[str, Any]:
-    with office.database.reading() as session:
+def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
+    with service.database.reading() as session:
         found = receiving.found_submission(session, number, viewer.account)
-        return viewing.told_submission(office, session, found, viewer.account, viewing.places_of(session))
+        return viewing.told_submission(service, session, found, viewer.account, viewing.places_of(session))
+
+
+@get("/metrics", sync_to_thread=True, include_in_schema=False)
+def metrics(service: ServiceHere, viewer: ViewerHere) -> Response[bytes]:
+    """Return the numbers in Prometheus' text format."""
+    if not (viewer.organiser or viewer.worker):
+        raise NotAuthorizedException("numbers are for organisers")
+    registry = CollectorRegistry()
+    with service.database.reading() as session:
+        status = viewing.told_status(service, session)
+        states = session.execute(select(Submission.state, func.count()).group_by(Submission.state)).all()
+    for name in ("waiting", "running", "workers"):
+        Gauge(f"dubins_traffic_{name}", f"{name}, see the page of the queue", registry=registry).set(
+            status[name]
+        )
+    gauge = Gauge("dubins_traffic_submissions", "submissions by state", ["state"], registry=registry)
+    for state, count in states:
+        gauge.labels(state).set(count)
+    return Response(generate_latest(registry), media_type=MediaType.TEXT)

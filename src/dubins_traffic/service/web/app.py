@@ -1,7 +1,11 @@
-"""The application: routes, who may use them, and what every answer carries."""
+"""The application: routes, who may use them, what every answer carries, and the sessions of who has logged in.
+
+Nothing is kept of others; no session outlives its log-in or keeps an older one's id.
+"""
 
 from __future__ import annotations
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -9,33 +13,85 @@ import structlog
 from jinja2 import Undefined
 from litestar import Litestar, MediaType, Request, Response
 from litestar.config.csrf import CSRFConfig
+from litestar.connection import ASGIConnection
 from litestar.di import Provide
 from litestar.exceptions import HTTPException
 from litestar.middleware import DefineMiddleware
 from litestar.middleware.rate_limit import RateLimitConfig
+from litestar.middleware.session.server_side import ServerSideSessionBackend, ServerSideSessionConfig
 from litestar.openapi import OpenAPIConfig
 from litestar.openapi.plugins import JsonRenderPlugin
 from litestar.openapi.spec import Components, SecurityScheme
 from litestar.plugins.jinja import JinjaTemplateEngine
 from litestar.response import Redirect, Template
 from litestar.static_files import create_static_files_router  # pyright: ignore[reportUnknownVariableType]
+from litestar.stores.base import StorageObject
+from litestar.stores.file import FileStore
 from litestar.template import TemplateConfig
+from litestar.types import Empty, Message
+from msgspec import MsgspecError
 from sqlalchemy.exc import DBAPIError
 
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service.accounts import WrongEntryError
-from dubins_traffic.service.office import Office
 from dubins_traffic.service.queue import StaleLeaseError
 from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.settings import Settings
+from dubins_traffic.service.service import Service, Settings
 from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
-from dubins_traffic.service.web import api, doors, login, metrics, organisers, pages, submitting, team
-from dubins_traffic.service.web.bodies import Bodies
-from dubins_traffic.service.web.said import TEMPLATES, moment
-from dubins_traffic.service.web.sessions import SessionConfig, SessionFiles
-from dubins_traffic.service.web.viewer import PROGRAMS, Recognition, Viewer
+from dubins_traffic.service.web import api, organisers, pages, worker_api
+from dubins_traffic.service.web.pages import TEMPLATES, moment
+from dubins_traffic.service.web.requests import PROGRAMS, Bodies, Recognition, Viewer
 from dubins_traffic.viewer.pages import environment
+
+LOADED = "loaded_session"
+"""Where the state of a request holds what its session was when it came."""
+
+
+class Sessions(ServerSideSessionBackend):
+    """Keeps a session under an id that is drawn when its content is set, and forgets what was kept under the old one.
+
+    A session that has not changed is not written: an answer that comes late does not bring back what has ended.
+    """
+
+    def get_session_id(self, connection: ASGIConnection[Any, Any, Any, Any]) -> str:  # noqa: ARG002
+        """Return a new id; that of the request's cookie serves to find a session alone."""
+        return self.generate_session_id()
+
+    async def load_from_connection(self, connection: ASGIConnection[Any, Any, Any, Any]) -> dict[str, Any]:
+        """Return the session of a request, and remember it."""
+        found = await super().load_from_connection(connection)  # pyright: ignore[reportUnknownMemberType]
+        connection.scope["state"][LOADED] = dict(found)
+        return found
+
+    async def store_in_message(
+        self, scope_session: Any, message: Message, connection: ASGIConnection[Any, Any, Any, Any]
+    ) -> None:
+        """End the session of the request and begin another, if it has changed."""
+        if scope_session is not Empty and scope_session == connection.scope["state"].get(LOADED):
+            return
+        known = connection.cookies.get(self.config.key)
+        if known:
+            await self.delete(known, self.config.get_store_from_app(connection.scope["litestar_app"]))
+        await super().store_in_message(scope_session, message, connection)  # pyright: ignore[reportUnknownMemberType]
+
+
+class SessionFiles(FileStore):
+    """Sessions in files."""
+
+    async def delete_expired(self) -> None:
+        """Remove what has expired; a file that is no session, such as one of a desktop, is left where it is."""
+        async for path in self.path.iterdir():
+            with contextlib.suppress(MsgspecError, OSError):
+                if StorageObject.from_bytes(await path.read_bytes()).expired:
+                    await path.unlink(missing_ok=True)
+
+
+class SessionConfig(ServerSideSessionConfig):
+    """The settings of `Sessions`."""
+
+    _backend_class = Sessions
+
 
 log = structlog.get_logger("dubins_traffic.service")
 POLICY = (
@@ -63,25 +119,25 @@ STATUS = {
 }
 
 
-def create_app(office: Office) -> Litestar:
+def create_app(service: Service) -> Litestar:
     """Return the application of a service."""
-    settings = office.settings
+    settings = service.settings
     largest = (max(settings.largest_upload, settings.largest_replay) << 20) + (1 << 20)
 
-    async def give_office() -> Office:
-        return office
+    async def give_service() -> Service:
+        return service
 
-    handlers = (pages.Pages, submitting.Submitting, login.Login, team.Teams, organisers.Organisers, api.Api)
+    handlers = (pages.Pages, pages.Submitting, pages.Login, pages.Teams, organisers.Organisers, api.Api)
     files = create_static_files_router(
         "/static", [Path(__file__).with_name("static")], include_in_schema=False
     )
-    kept = SessionFiles(office.folder / "sessions", create_directories=True)
+    kept = SessionFiles(service.folder / "sessions", create_directories=True)
     return Litestar(
-        route_handlers=[*handlers, doors.Doors, metrics.metrics, files],
-        dependencies={"office": Provide(give_office), "viewer": Provide(_viewer)},
+        route_handlers=[*handlers, worker_api.WorkerApi, api.metrics, files],
+        dependencies={"service": Provide(give_service), "viewer": Provide(_viewer)},
         middleware=_middleware(settings, largest),
         csrf_config=CSRFConfig(
-            office.cookie_secret,
+            service.cookie_secret,
             cookie_name=f"{_prefix(settings)}csrf",
             cookie_secure=settings.secure,
             cookie_httponly=True,
@@ -95,7 +151,7 @@ def create_app(office: Office) -> Litestar:
         request_max_body_size=largest,
         logging_config=None,
         openapi_config=_described(settings.name),
-        state=_state(office),
+        state=_state(service),
     )
 
 
@@ -126,10 +182,10 @@ def _templates() -> JinjaTemplateEngine:
     return JinjaTemplateEngine.from_environment(made)
 
 
-def _state(office: Office) -> Any:
+def _state(service: Service) -> Any:
     from litestar.datastructures import State
 
-    return State({"office": office})
+    return State({"service": service})
 
 
 async def _viewer(request: Request[Any, Any, Any]) -> Viewer:
@@ -180,12 +236,12 @@ def _answer_to(request: Request[Any, Any, Any], error: Exception) -> Response[An
     if status == 401 and request.method == "GET":
         return Redirect("/login", headers=HEADERS)
     viewer = request.scope["user"] if "user" in request.scope else Viewer()
-    office: Office = request.app.state["office"]
+    service: Service = request.app.state["service"]
     return Template(
         f"{TEMPLATES}/error.html",
         context={
             "viewer": viewer,
-            "site": office.settings.name,
+            "site": service.settings.name,
             "status": status,
             "detail": detail,
             "title": f"Error {status}",

@@ -11,15 +11,14 @@ from litestar.params import FromPath, MultipartBody, URLEncodedBody
 from litestar.response import Redirect, Template
 from sqlalchemy import select
 
-from dubins_traffic.service import accounts, exporting, organising, receiving, viewing
+from dubins_traffic.service import accounts, organising, receiving, viewing
 from dubins_traffic.service.accounts import WrongEntryError
-from dubins_traffic.service.office import Office
 from dubins_traffic.service.receiving import UnknownError
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.tables import Account, Act, Competition, Submission, Team
-from dubins_traffic.service.web import bodies
-from dubins_traffic.service.web import viewer as who
-from dubins_traffic.service.web.said import Form, page
-from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
+from dubins_traffic.service.web import requests
+from dubins_traffic.service.web.pages import Form, page
+from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
 
 Given = URLEncodedBody[Form]
 
@@ -37,17 +36,17 @@ class Organisers(Controller):
 
     path = "/desk"
     include_in_schema = False
-    guards = [who.organiser]  # noqa: RUF012
+    guards = [requests.organiser]  # noqa: RUF012
 
     @get("/", sync_to_thread=True)
-    def desk(self, office: OfficeHere, viewer: ViewerHere) -> Template:
+    def desk(self, service: ServiceHere, viewer: ViewerHere) -> Template:
         """Show the desk."""
-        return _shown(office, viewer)
+        return _shown(service, viewer)
 
-    @post("/create", sync_to_thread=True, opt={bodies.FILES: True})
+    @post("/create", sync_to_thread=True, opt={requests.FILES: True})
     def create(
         self,
-        office: OfficeHere,
+        service: ServiceHere,
         viewer: ViewerHere,
         data: MultipartBody[NewCompetition],
     ) -> Redirect:
@@ -55,77 +54,77 @@ class Organisers(Controller):
         given = {item.filename: item.file.read() for item in data.files if item.filename}
         if not given:
             raise WrongEntryError("files: choose competition.toml and the files that it names")
-        made = organising.create(office, data.address, given, viewer.person)
+        made = organising.create(service, data.address, given, viewer.person)
         return Redirect(f"/desk/c/{made.slug}", status_code=303)
 
     @post("/invite", sync_to_thread=True, status_code=200)
-    def invite(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Template:
+    def invite(self, service: ServiceHere, viewer: ViewerHere, data: Given) -> Template:
         """Show a new invitation."""
         role = data.get("role", accounts.PARTICIPANT)
         if role not in accounts.ROLES:
             raise WrongEntryError("role: participant or organiser")
-        with office.database.writing() as session:
-            code = accounts.invite(session, role, None, office.clock())
-            accounts.note(session, viewer.person, "invite", role, "", office.clock())
-        return _shown(office, viewer, code=code)
+        with service.database.writing() as session:
+            code = accounts.invite(session, role, None, service.clock())
+            accounts.note(session, viewer.person, "invite", role, "", service.clock())
+        return _shown(service, viewer, code=code)
 
     @post("/worker", sync_to_thread=True, status_code=200)
-    def worker(self, office: OfficeHere, viewer: ViewerHere, data: Given) -> Template:
+    def worker(self, service: ServiceHere, viewer: ViewerHere, data: Given) -> Template:
         """Show the token of a new worker, this once."""
         if accounts.clean_name(data.get("name", ""), "name") == accounts.LOCAL:
             raise WrongEntryError("name: that of the workers beside the server")
-        with office.database.writing() as session:
-            token = accounts.new_token(session, data.get("name", ""), None, office.clock())
-            accounts.note(session, viewer.person, "worker token", data.get("name", ""), "", office.clock())
-        return _shown(office, viewer, token=token)
+        with service.database.writing() as session:
+            token = accounts.new_token(session, data.get("name", ""), None, service.clock())
+            accounts.note(session, viewer.person, "worker token", data.get("name", ""), "", service.clock())
+        return _shown(service, viewer, token=token)
 
     @post("/worker/{number:int}/revoke", sync_to_thread=True)
-    def revoke(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+    def revoke(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Revoke the token of a worker; what it has on lease goes to another."""
-        with office.database.writing() as session:
+        with service.database.writing() as session:
             token = next((one for one in accounts.worker_tokens(session) if one.id == number), None)
             if token is None:
                 raise WrongEntryError("no such worker")
-            token.revoked = office.clock()
-            accounts.note(session, viewer.person, "revoke worker", token.name, "", office.clock())
+            token.revoked = service.clock()
+            accounts.note(session, viewer.person, "revoke worker", token.name, "", service.clock())
         return Redirect("/desk", status_code=303)
 
     @post("/accounts/{number:int}/reset", sync_to_thread=True, status_code=200)
-    def reset(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
+    def reset(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
         """Show a code by which a person can choose another password."""
-        with office.database.writing() as session:
+        with service.database.writing() as session:
             account = _account(session, number)
-            code = accounts.offer_reset(session, account, office.clock())
-            accounts.note(session, viewer.person, "reset", f"account {number}", "", office.clock())
-        return _shown(office, viewer, reset=code)
+            code = accounts.offer_reset(session, account, service.clock())
+            accounts.note(session, viewer.person, "reset", f"account {number}", "", service.clock())
+        return _shown(service, viewer, reset=code)
 
     @post("/accounts/{number:int}/remove", sync_to_thread=True)
-    def remove(self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+    def remove(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Remove an account."""
-        with office.database.writing() as session:
-            accounts.remove(session, _account(session, number), office.clock())
-            accounts.note(session, viewer.person, "remove account", f"account {number}", "", office.clock())
+        with service.database.writing() as session:
+            accounts.remove(session, _account(session, number), service.clock())
+            accounts.note(session, viewer.person, "remove account", f"account {number}", "", service.clock())
         return Redirect("/desk", status_code=303)
 
     @get("/c/{slug:str}", sync_to_thread=True)
-    def competition(self, office: OfficeHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
+    def competition(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
         """Show the phases of a competition and all its submissions."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
             if row is None:
                 raise UnknownError("no such competition")
-            told, places = viewing.told_competition(office, row), viewing.places_of(session)
+            told, places = viewing.told_competition(service, row), viewing.places_of(session)
             for phase, shown in zip(row.phases, told["phases"], strict=True):
                 found = receiving.submissions_of(session, phase, None)
                 shown["submissions"] = [
                     {"row": one, "team": one.team.name, "place": places.get(one.id)} for one in found
                 ]
-        return page(office, viewer, "organise", f"Organise {told['title']}", competition=told)
+        return page(service, viewer, "organise", f"Organise {told['title']}", competition=told)
 
     @post("/c/{slug:str}/{name:str}/{act:str}", sync_to_thread=True)
     def act(
         self,
-        office: OfficeHere,
+        service: ServiceHere,
         viewer: ViewerHere,
         slug: FromPath[str],
         name: FromPath[str],
@@ -135,45 +134,45 @@ class Organisers(Controller):
         acts = {"open": organising.open_phase, "close": organising.close_phase, "reveal": organising.reveal}
         if act not in acts:
             raise UnknownError("no such act")
-        with office.database.writing() as session:
-            acts[act](office, session, receiving.found_phase(session, slug, name), viewer.person)
-        organising.publish_opened(office)
+        with service.database.writing() as session:
+            acts[act](service, session, receiving.found_phase(session, slug, name), viewer.person)
+        organising.publish_opened(service)
         return Redirect(f"/desk/c/{slug}", status_code=303)
 
     @get("/c/{slug:str}/export.zip", sync_to_thread=True)
-    def export(self, office: OfficeHere, slug: FromPath[str]) -> Response[bytes]:
+    def export(self, service: ServiceHere, slug: FromPath[str]) -> Response[bytes]:
         """Return all that is needed to run the competition again."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
             if row is None:
                 raise UnknownError("no such competition")
-            data = exporting.export(office, session, row)
+            data = organising.export(service, session, row)
         headers = {"content-disposition": f'attachment; filename="{slug}.zip"'}
         return Response(data, media_type="application/zip", headers=headers)
 
     @post("/s/{number:int}/{act:str}", sync_to_thread=True)
     def submission(
-        self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int], act: FromPath[str], data: Given
+        self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], act: FromPath[str], data: Given
     ) -> Redirect:
         """Judge a submission again, or disqualify it."""
         acts = {"rejudge": organising.judge_again, "disqualify": organising.disqualify}
         if act not in acts:
             raise UnknownError("no such act")
-        with office.database.writing() as session:
+        with service.database.writing() as session:
             found = session.get(Submission, number) if number < 1 << 31 else None
             if found is None:
                 raise UnknownError("no such submission")
-            acts[act](office, session, found, viewer.person, data.get("why", ""))
+            acts[act](service, session, found, viewer.person, data.get("why", ""))
             slug = found.phase.competition.slug
         return Redirect(f"/desk/c/{slug}", status_code=303)
 
     @get("/log", sync_to_thread=True)
-    def log(self, office: OfficeHere, viewer: ViewerHere) -> Template:
+    def log(self, service: ServiceHere, viewer: ViewerHere) -> Template:
         """Show what organisers did."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             acts = session.scalars(select(Act).order_by(Act.id.desc()).limit(500)).all()
             names = {account.id: account.name for account in session.scalars(select(Account))}
-        return page(office, viewer, "log", "Log of acts", acts=acts, names=names)
+        return page(service, viewer, "log", "Log of acts", acts=acts, names=names)
 
 
 def _account(session: viewing.Session, number: int) -> Account:
@@ -183,15 +182,15 @@ def _account(session: viewing.Session, number: int) -> Account:
     return account
 
 
-def _shown(office: Office, viewer: Viewer, **secret: Any) -> Template:
-    with office.database.reading() as session:
+def _shown(service: Service, viewer: Viewer, **secret: Any) -> Template:
+    with service.database.reading() as session:
         competitions = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
         people = session.scalars(select(Account).where(Account.removed.is_(None)).order_by(Account.id)).all()
         teams = {team.id: team.name for team in session.scalars(select(Team))}
         workers = accounts.worker_tokens(session)
     given = {"code": "", "token": "", "reset": "", **secret}
     return page(
-        office,
+        service,
         viewer,
         "desk",
         "Desk",
@@ -199,6 +198,6 @@ def _shown(office: Office, viewer: Viewer, **secret: Any) -> Template:
         people=people,
         teams=teams,
         workers=workers,
-        url=office.settings.url,
+        url=service.settings.url,
         **given,
     )

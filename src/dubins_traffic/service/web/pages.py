@@ -1,23 +1,52 @@
-"""Pages that everybody may open: competitions, phases, tables, the state of the queue, replays."""
+"""Pages: those that everybody may open, those of a team about itself and its submissions, and those to log in."""
 
 from __future__ import annotations
 
+import secrets
 from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from typing import Any
 
-from litestar import Controller, MediaType, Response, get
+from litestar import Controller, MediaType, Request, Response, get, post
+from litestar.datastructures import UploadFile
 from litestar.exceptions import NotFoundException
-from litestar.params import FromPath
-from litestar.response import Template
+from litestar.params import FromPath, FromQuery, MultipartBody, URLEncodedBody
+from litestar.response import Redirect, Template
 from sqlalchemy import select
+from sqlalchemy.orm import Session
 
 from dubins_traffic.competition import sealing
-from dubins_traffic.service import receiving, standings, submissions, viewing
+from dubins_traffic.service import accounts, receiving, standings, submissions, viewing
+from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.hiding import replays_of
-from dubins_traffic.service.office import Office, competition_of
 from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.tables import Competition, Standing, Submission, Trial
-from dubins_traffic.service.web.said import page
-from dubins_traffic.service.web.viewer import OfficeHere, Viewer, ViewerHere
+from dubins_traffic.service.service import Service, competition_of
+from dubins_traffic.service.submissions import RefusedError
+from dubins_traffic.service.tables import Account, Competition, Standing, Submission, Team, Token, Trial
+from dubins_traffic.service.web import requests
+from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
+
+Form = dict[str, str]
+TEMPLATES = "service/web/templates"
+
+
+def page(service: Service, viewer: Viewer, template: str, title: str, /, **given: Any) -> Template:
+    """Return a page by its template."""
+    context = {
+        "viewer": viewer,
+        "site": service.settings.name,
+        "title": title,
+        "now": service.clock(),
+        **given,
+    }
+    return Template(f"{TEMPLATES}/{template}.html", context=context)
+
+
+def moment(at: float | None) -> str:
+    """Return a time as people read it, in UTC."""
+    return "" if at is None else datetime.fromtimestamp(at, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
 
 REPLAY_POLICY = (
     "sandbox allow-scripts; default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
@@ -32,56 +61,56 @@ class Pages(Controller):
     include_in_schema = False
 
     @get("/", sync_to_thread=True)
-    def home(self, office: OfficeHere, viewer: ViewerHere) -> Template:
+    def home(self, service: ServiceHere, viewer: ViewerHere) -> Template:
         """Show all competitions."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             rows = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
-            told = [viewing.told_competition(office, row) for row in rows]
-        return page(office, viewer, "home", "Competitions", competitions=told)
+            told = [viewing.told_competition(service, row) for row in rows]
+        return page(service, viewer, "home", "Competitions", competitions=told)
 
     @get("/c/{slug:str}", sync_to_thread=True)
-    def competition(self, office: OfficeHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
+    def competition(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
         """Show a competition and its phases."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             row = competition_of(session, slug)
             if row is None:
                 raise NotFoundException("no such competition")
-            told = viewing.told_competition(office, row)
-        return page(office, viewer, "competition", told["title"], competition=told)
+            told = viewing.told_competition(service, row)
+        return page(service, viewer, "competition", told["title"], competition=told)
 
     @get("/c/{slug:str}/{name:str}", sync_to_thread=True)
     def phase(
-        self, office: OfficeHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
     ) -> Template:
         """Show a phase: rules, limits, the form to submit, the own submissions."""
-        at, account = office.clock(), viewer.account
-        with office.database.reading() as session:
+        at, account = service.clock(), viewer.account
+        with service.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
-            told, own, used = viewing.told_phase(office, row, at), [], None
+            told, own, used = viewing.told_phase(service, row, at), [], None
             if account is not None and account.team_id is not None:
                 places = viewing.places_of(session)
                 found = receiving.submissions_of(session, row, account.team_id)
                 own = [
-                    viewing.told_submission(office, session, one, None, places, logs=False) for one in found
+                    viewing.told_submission(service, session, one, None, places, logs=False) for one in found
                 ]
                 used = submissions.used(session, row, account.team_id, at)
             title = row.competition.title
         given = {"phase": told, "own": own, "used": used, "slug": slug, "competition": title}
         return page(
-            office, viewer, "phase", f"{title}: {name}", largest=office.settings.largest_upload, **given
+            service, viewer, "phase", f"{title}: {name}", largest=service.settings.largest_upload, **given
         )
 
     @get("/c/{slug:str}/{name:str}/table", sync_to_thread=True)
     def table(
-        self, office: OfficeHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
     ) -> Template:
         """Show the leaderboard of a phase and its history."""
-        at = office.clock()
-        with office.database.reading() as session:
+        at = service.clock()
+        with service.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
-            phase, told = office.phase(row), viewing.told_phase(office, row, at)
+            phase, told = service.phase(row), viewing.told_phase(service, row, at)
             sees = viewing.sees_table(row, viewer.account, at)
-            every: Sequence[Standing] = standings.history(session, row, office.hiding(row)) if sees else ()
+            every: Sequence[Standing] = standings.history(session, row, service.hiding(row)) if sees else ()
             whole = row.is_closed(at) or viewer.organiser
             tables = [
                 (one.at, list(one.places) if whole else standings.shown_table(phase, one)) for one in every
@@ -90,35 +119,35 @@ class Pages(Controller):
         given = {"phase": told, "slug": slug, "competition": title, "sees": sees}
         latest = tables[-1] if tables else None
         past = tables[-21:-1][::-1]
-        return page(office, viewer, "table", f"{title}: {name}: table", latest=latest, past=past, **given)
+        return page(service, viewer, "table", f"{title}: {name}: table", latest=latest, past=past, **given)
 
     @get("/c/{slug:str}/{name:str}/commitment.json", sync_to_thread=True)
-    def commitment(self, office: OfficeHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
+    def commitment(self, service: ServiceHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
         """Return the published commitment to secret seeds."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
             if row.commitment is None:
                 raise NotFoundException("no commitment has been published")
-            path = sealing.commitment_path(office.phase(row))
+            path = sealing.commitment_path(service.phase(row))
         return Response(path.read_text(encoding="utf-8"), media_type=MediaType.JSON)
 
     @get("/c/{slug:str}/{name:str}/seeds.txt", sync_to_thread=True)
-    def seeds(self, office: OfficeHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
+    def seeds(self, service: ServiceHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
         """Return the revealed seeds."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
             if row.revealed is None:
                 raise NotFoundException("the seeds are not revealed")
-            path = sealing.revealed_path(office.phase(row))
+            path = sealing.revealed_path(service.phase(row))
         return Response(path.read_text(encoding="utf-8"), media_type=MediaType.TEXT)
 
     @get("/s/{number:int}/trials/{trial:int}", sync_to_thread=True)
     def trial(
-        self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
+        self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
     ) -> Template:
         """Show a trial: its score, its log, its replay."""
-        with office.database.reading() as session:
-            submission, found = _seen(office, viewer, number, trial, session)
+        with service.database.reading() as session:
+            submission, found = _seen(service, viewer, number, trial, session)
             own = viewing.owns(viewer.account, submission)
             row = found.row if own else viewing.shared(found.row)
             given = {
@@ -129,44 +158,287 @@ class Pages(Controller):
                 "phase": submission.phase.name,
                 "slug": submission.phase.competition.slug,
                 "own": own,
-                "of": len(office.phase(submission.phase).numbers),
+                "of": len(service.phase(submission.phase).numbers),
             }
-        return page(office, viewer, "trial", f"Trial {trial} of submission {number}", **given)
+        return page(service, viewer, "trial", f"Trial {trial} of submission {number}", **given)
 
     @get("/s/{number:int}/trials/{trial:int}/replay", sync_to_thread=True)
     def replay(
-        self, office: OfficeHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
+        self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
     ) -> Response[bytes]:
         """Return the page that replays a trial, for a frame that may do nothing but draw."""
-        with office.database.reading() as session:
-            submission, found = _seen(office, viewer, number, trial, session)
-            hiding = office.hiding(submission.phase)
+        with service.database.reading() as session:
+            submission, found = _seen(service, viewer, number, trial, session)
+            hiding = service.hiding(submission.phase)
             digest = viewing.replay_of(found, submission, viewer.account)
         if digest is None:
             raise NotFoundException("this trial has no replay")
         headers = {"content-encoding": "gzip", "content-security-policy": REPLAY_POLICY}
-        data = hiding.show(office.storage.get(digest, "replays"), replays_of(found))
+        data = hiding.show(service.storage.get(digest, "replays"), replays_of(found))
         return Response(data, media_type="text/html; charset=utf-8", headers=headers)
 
     @get("/status", sync_to_thread=True)
-    def status(self, office: OfficeHere, viewer: ViewerHere) -> Template:
+    def status(self, service: ServiceHere, viewer: ViewerHere) -> Template:
         """Show the queue and the workers."""
-        with office.database.reading() as session:
-            told = viewing.told_status(office, session)
+        with service.database.reading() as session:
+            told = viewing.told_status(service, session)
             workers = viewing.workers(session) if viewer.organiser else []
-        return page(office, viewer, "status", "Queue and workers", status=told, workers=workers)
+        return page(service, viewer, "status", "Queue and workers", status=told, workers=workers)
 
 
 def _seen(
-    office: Office, viewer: Viewer, number: int, trial: int, session: viewing.Session
+    service: Service, viewer: Viewer, number: int, trial: int, session: viewing.Session
 ) -> tuple[Submission, Trial]:
     """Return a trial that somebody may see now, with its submission."""
     submission = session.get(Submission, number) if number < 1 << 31 else None
     if submission is None or trial >= 1 << 31:
         raise UnknownError("no such trial")
-    if not viewing.sees_trials(submission.phase, viewer.account, submission, office.clock()):
+    if not viewing.sees_trials(submission.phase, viewer.account, submission, service.clock()):
         raise UnknownError("no such trial")
-    found = viewing.trial_of(office, session, submission, trial)
+    found = viewing.trial_of(service, session, submission, trial)
     if found is None:
         raise UnknownError("no such trial")
     return submission, found
+
+
+@dataclass
+class Sent:
+    """The form with a submission."""
+
+    file: UploadFile
+
+
+class Submitting(Controller):
+    """What a team does with its submissions."""
+
+    include_in_schema = False
+    guards = [requests.person]  # noqa: RUF012
+
+    @post("/c/{slug:str}/{name:str}/submit", sync_to_thread=True, opt={requests.FILES: True})
+    def submit(
+        self,
+        service: ServiceHere,
+        viewer: ViewerHere,
+        slug: FromPath[str],
+        name: FromPath[str],
+        data: MultipartBody[Sent],
+    ) -> Redirect:
+        """Take in a submission."""
+        sent = data.file.file.read()
+        number, _ = receiving.take_in(service, viewer.person, slug, name, data.file.filename, sent)
+        return Redirect(f"/s/{number}", status_code=303)
+
+    @get("/s/{number:int}", sync_to_thread=True)
+    def submission(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
+        """Show a submission."""
+        return page(service, viewer, "submission", f"Submission {number}", **_view(service, viewer, number))
+
+    @get("/s/{number:int}/live", sync_to_thread=True)
+    def live(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
+        """Return the part of the page of a submission that changes."""
+        return page(service, viewer, "live", "", **_view(service, viewer, number))
+
+    @post("/s/{number:int}/cancel", sync_to_thread=True)
+    def cancel(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Cancel a submission."""
+        receiving.cancel(service, viewer.person, number)
+        return Redirect(f"/s/{number}", status_code=303)
+
+    @post("/s/{number:int}/name", sync_to_thread=True)
+    def name(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Let a submission be the one that counts."""
+        receiving.name_it(service, viewer.person, number)
+        return Redirect(f"/s/{number}", status_code=303)
+
+
+def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
+    with service.database.reading() as session:
+        found = receiving.found_submission(session, number, viewer.account)
+        places = viewing.places_of(session)
+        told = viewing.told_submission(service, session, found, viewer.account, places, logs=False)
+        differing = viewing.differing(service, session, found) if "trials" in told else []
+        closed = found.phase.is_closed(service.clock())
+    return {"submission": told, "differing": differing, "closed": closed}
+
+
+Given = URLEncodedBody[Form]
+
+
+class Teams(Controller):
+    """What a person does with the own team and account."""
+
+    path = "/team"
+    include_in_schema = False
+    guards = [requests.person]  # noqa: RUF012
+
+    @get("/", sync_to_thread=True)
+    def team(self, service: ServiceHere, viewer: ViewerHere) -> Template:
+        """Show the team, and the own account."""
+        return _shown(service, viewer)
+
+    @post("/found", sync_to_thread=True)
+    def found(self, service: ServiceHere, viewer: ViewerHere, data: Given) -> Redirect:
+        """Found a team."""
+        with service.database.writing() as session:
+            account = session.get_one(Account, viewer.person.id)
+            if account.team_id is not None:
+                raise RefusedError("you are in a team already")
+            account.team_id = accounts.found_team(session, data.get("name", ""), service.clock()).id
+        return Redirect("/team", status_code=303)
+
+    @post("/invite", sync_to_thread=True, status_code=200)
+    def invite(self, service: ServiceHere, viewer: ViewerHere) -> Template:
+        """Show a new code by which one person can join the team."""
+        if viewer.team is None:
+            raise RefusedError("you are in no team")
+        with service.database.writing() as session:
+            team = session.get_one(Team, viewer.team.id)
+            code = accounts.invite(session, accounts.PARTICIPANT, team, service.clock())
+        return _shown(service, viewer, code=code)
+
+    @post("/tokens", sync_to_thread=True, status_code=200)
+    def token(self, service: ServiceHere, viewer: ViewerHere, data: Given) -> Template:
+        """Show a new token of the API, this once."""
+        with service.database.writing() as session:
+            account = session.get_one(Account, viewer.person.id)
+            token = accounts.new_token(session, data.get("name", ""), account, service.clock())
+        return _shown(service, viewer, token=token)
+
+    @post("/tokens/{number:int}/revoke", sync_to_thread=True)
+    def revoke(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Revoke a token."""
+        with service.database.writing() as session:
+            token = session.get(Token, number) if number < 1 << 31 else None
+            if token is None or token.account_id != viewer.person.id:
+                raise WrongEntryError("no such token")
+            token.revoked = service.clock()
+        return Redirect("/team", status_code=303)
+
+    @post("/password", sync_to_thread=True)
+    def password(
+        self, request: Request[Any, Any, Any], service: ServiceHere, viewer: ViewerHere, data: Given
+    ) -> Redirect:
+        """Set another password."""
+        with service.database.writing() as session:
+            account = _sure(session, viewer, data)
+            accounts.set_password(session, account, data.get("new", ""), service.clock())
+            keep(request, account)
+        return Redirect("/team", status_code=303)
+
+    @post("/remove", sync_to_thread=True)
+    def remove(
+        self, request: Request[Any, Any, Any], service: ServiceHere, viewer: ViewerHere, data: Given
+    ) -> Redirect:
+        """Remove the own account."""
+        with service.database.writing() as session:
+            account = _sure(session, viewer, data)
+            accounts.remove(session, account, service.clock())
+            accounts.note(
+                session, None, "remove account", f"account {account.id}", "by its owner", service.clock()
+            )
+        request.clear_session()
+        return Redirect("/", status_code=303)
+
+
+def _sure(session: Session, viewer: Viewer, data: Form) -> Account:
+    """Return the own account, if the password given is its."""
+    account = accounts.verified(session, viewer.person.name, data.get("password", ""))
+    if account is None:
+        raise WrongEntryError("password: not that of this account")
+    return account
+
+
+def _shown(service: Service, viewer: Viewer, code: str = "", token: str = "") -> Template:
+    with service.database.reading() as session:
+        team = session.get(Team, viewer.person.team_id) if viewer.person.team_id else None
+        members = [own.name for own in team.accounts] if team else []
+        tokens = accounts.tokens(session, viewer.person)
+    given = {"team": team, "members": members, "tokens": tokens, "code": code, "token": token}
+    return page(service, viewer, "team", "Team and account", url=service.settings.url, **given)
+
+
+Asked = Request[Any, Any, Any]
+
+
+class Login(Controller):
+    """The door of people."""
+
+    include_in_schema = False
+
+    @get("/login", sync_to_thread=True)
+    def login_page(self, service: ServiceHere, viewer: ViewerHere) -> Template:
+        """Show the form to log in."""
+        return page(service, viewer, "login", "Log in", wrong="", name="")
+
+    @post("/login", sync_to_thread=True, status_code=200)
+    def login(
+        self, request: Asked, service: ServiceHere, viewer: ViewerHere, data: Given
+    ) -> Template | Redirect:
+        """Log in."""
+        with service.database.reading() as session:
+            account = accounts.verified(session, data.get("name", ""), data.get("password", ""))
+        if account is None:
+            wrong = "No account has this name and password."
+            return page(service, viewer, "login", "Log in", wrong=wrong, name=data.get("name", ""))
+        return _enter(request, account)
+
+    @post("/logout", sync_to_thread=False)
+    def logout(self, request: Asked) -> Redirect:
+        """Log out."""
+        request.clear_session()
+        return Redirect("/")
+
+    @get("/join", sync_to_thread=True)
+    def join_page(self, service: ServiceHere, viewer: ViewerHere, code: FromQuery[str] = "") -> Template:
+        """Show the form to make an account."""
+        return page(service, viewer, "join", "Join", wrong="", given={"code": code})
+
+    @post("/join", sync_to_thread=True, status_code=200)
+    def join(
+        self, request: Asked, service: ServiceHere, viewer: ViewerHere, data: Given
+    ) -> Template | Redirect:
+        """Make an account by an invitation, and log in."""
+        try:
+            with service.database.writing() as session:
+                account = accounts.register(
+                    session,
+                    data.get("code", ""),
+                    data.get("name", ""),
+                    data.get("password", ""),
+                    data.get("team", ""),
+                    service.clock(),
+                )
+        except WrongEntryError as error:
+            return page(service, viewer, "join", "Join", wrong=str(error), given={**data, "password": ""})
+        return _enter(request, account)
+
+    @get("/reset", sync_to_thread=True)
+    def reset_page(self, service: ServiceHere, viewer: ViewerHere, code: FromQuery[str] = "") -> Template:
+        """Show the form for a new password."""
+        return page(service, viewer, "reset", "New password", wrong="", code=code)
+
+    @post("/reset", sync_to_thread=True, status_code=200)
+    def reset(
+        self, request: Asked, service: ServiceHere, viewer: ViewerHere, data: Given
+    ) -> Template | Redirect:
+        """Set a new password by a code, and log in."""
+        try:
+            with service.database.writing() as session:
+                account = accounts.reset(
+                    session, data.get("code", ""), data.get("password", ""), service.clock()
+                )
+        except WrongEntryError as error:
+            return page(service, viewer, "reset", "New password", wrong=str(error), code=data.get("code", ""))
+        return _enter(request, account)
+
+
+def keep(request: Asked, account: Account) -> None:
+    """Begin a session: whose it is, the number of the password with which it was begun, and what no other has."""
+    session: Any = {"account": account.id, "epoch": account.epoch, "begun": secrets.token_hex(16)}
+    request.set_session(session)  # pyright: ignore[reportUnknownMemberType]
+
+
+def _enter(request: Asked, account: Account) -> Redirect:
+    """Begin a session, and lead on."""
+    keep(request, account)
+    return Redirect("/", status_code=303)

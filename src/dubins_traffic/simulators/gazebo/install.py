@@ -1,4 +1,4 @@
-"""Installs Gazebo into a folder of the user, and checks it."""
+"""Installs Gazebo into a folder of the user, and checks step by step whether it can be used."""
 
 from __future__ import annotations
 
@@ -9,13 +9,84 @@ import platform
 import shutil
 import signal
 import subprocess
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
+import numpy as np
+
+from dubins_traffic.cars.body import Disc
+from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
-from dubins_traffic.simulators.gazebo import build, prefix
-from dubins_traffic.simulators.gazebo.doctor import drive_ahead
+from dubins_traffic.simulators.gazebo import prefix
+from dubins_traffic.simulators.gazebo.link import Kind, LostError
+from dubins_traffic.simulators.gazebo.prefix import Installation
+from dubins_traffic.simulators.gazebo.server import Server
+from dubins_traffic.simulators.gazebo.world import WHEEL_RADIUS, world
+
+STEPS: Final = 200
+SPEED: Final = 0.5
+SLACK: Final = 0.01
+"""Largest error of the car's position after `STEPS` steps of 5 ms at `SPEED` m/s, metres."""
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One check: whether it passed, and what was observed."""
+
+    what: str
+    well: bool
+    seen: str
+
+
+def examine(folder: Path) -> Iterator[Finding]:
+    """Yield the checks of the installation in `folder`; after a failure those that depend on it are left out."""
+    try:
+        yield Finding("compiler", True, prefix.compiler())
+    except InputError as error:
+        yield Finding("compiler", False, str(error))
+    try:
+        installation = prefix.find(folder)
+    except InputError as error:
+        yield Finding("installation", False, str(error))
+        return
+    manifest = prefix.read_manifest(folder) or {}
+    yield Finding("installation", True, str(folder))
+    yield Finding("gzserver", True, f"{installation.gzserver}, version {manifest.get('gazebo')}")
+    yield Finding("plugin", True, str(installation.plugin))
+    try:
+        drive_ahead(installation)
+        yield Finding("one car drives ahead", True, f"{SPEED} m/s for 1 s")
+    except InputError as error:
+        yield Finding("one car drives ahead", False, str(error))
+
+
+def drive_ahead(installation: Installation) -> None:
+    """Start a server, let one car drive for a second, and end it.
+
+    InputError if anything of this fails, or the car is not where it should be.
+    """
+    text = world([Pose(0.0, 0.0, 1.0, 0.0)], Disc(), (), 1.0 / STEPS, str(installation.plugin))
+    server = None
+    try:
+        server = Server(installation, text)
+        rate = SPEED / WHEEL_RADIUS
+        x, y = server.ask(Kind.STEP, np.array([STEPS, rate, rate]))[:2].tolist()
+    except LostError as error:
+        why = str(error) if server is None else server.explain(error)
+        raise InputError(f"Gazebo does not work here ({why})", file=str(installation.gzserver)) from error
+    finally:
+        if server is not None:
+            server.close()
+    if abs(x - SPEED) > SLACK or abs(y) > SLACK:
+        raise InputError(
+            "Gazebo moves a car wrongly",
+            file=str(installation.gzserver),
+            value=(x, y),
+            expected=f"({SPEED}, 0) to within {SLACK} m",
+        )
+
 
 ROOM: Final = 1_350_000_000
 """Bytes that an installation needs on disk while it is made."""
@@ -76,7 +147,7 @@ def _install(folder: Path, progress: Progress) -> None:
             _unpack(folder, root, progress)
     assert server is not None
     progress("compile the plugin", 0.0)
-    build.build(folder, root)
+    prefix.build(folder, root)
     progress("compile the plugin", 1.0)
     version = server_version(server, root)
     prefix.write_manifest(folder, server, own=root is None, version=version)
@@ -107,10 +178,7 @@ def _unpack(folder: Path, root: Path, progress: Progress) -> None:
 def fetch_packages(folder: Path, progress: Progress) -> None:
     """Fetch and unpack Debian's packages of Gazebo below `folder`, by a script that goes on where it stopped.
 
-    Raises
-    ------
-    InputError
-        If it could not; says what the script said last.
+    InputError if it could not; says what the script said last.
     """
     beside = Path(__file__).with_name(SCRIPT)
     script = beside if beside.is_file() else Path(__file__).parents[4] / "scripts" / SCRIPT
@@ -142,7 +210,7 @@ def check_machine() -> None:
     numbers = tuple(int(part) for part in version.split(".")[:2] if part.isdigit())
     if library != "glibc" or numbers < OLDEST_LIBC:
         raise InputError("too old a C library", value=f"{library} {version}", expected="glibc 2.31 or newer")
-    build.compiler()
+    prefix.compiler()
 
 
 def own_server() -> Path | None:
@@ -155,13 +223,7 @@ def own_server() -> Path | None:
 
 
 def server_version(server: Path, root: Path | None) -> str:
-    """Return the version that gzserver reports.
-
-    Raises
-    ------
-    InputError
-        If it does not run here.
-    """
+    """Return the version that gzserver reports; InputError if it does not run here."""
     around = {} if root is None else prefix.surroundings(root)
     try:
         done = subprocess.run(

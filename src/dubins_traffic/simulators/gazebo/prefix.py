@@ -1,11 +1,19 @@
-"""Finds Gazebo, in a folder of this package or on the machine, and the environment that its programs need."""
+"""Finds Gazebo, in a folder of this package or on the machine, and the environment that its programs need.
+
+The world plugin, whose source is shipped with the package, is compiled against the headers of an installation.
+"""
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
+import shlex
+import shutil
+import subprocess
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any, Final, cast
 
@@ -13,7 +21,7 @@ from platformdirs import user_cache_path
 
 from dubins_traffic import files
 from dubins_traffic.errors import InputError
-from dubins_traffic.simulators.gazebo import build
+from dubins_traffic.simulators.gazebo.link import PROTOCOL
 
 VARIABLE: Final = "DUBINS_TRAFFIC_GAZEBO"
 """The environment variable that names another folder than the default."""
@@ -33,12 +41,12 @@ class Installation:
     @property
     def plugin(self) -> Path:
         """The compiled world plugin."""
-        return self.prefix / build.folder_name() / build.PLUGIN
+        return self.prefix / folder_name() / PLUGIN
 
     @property
     def confinement(self) -> Path:
         """The library that is preloaded into the server."""
-        return self.prefix / build.folder_name() / build.CONFINEMENT
+        return self.prefix / folder_name() / CONFINEMENT
 
     @property
     def gzclient(self) -> Path:
@@ -87,10 +95,7 @@ def place(prefix: str | os.PathLike[str] | None = None) -> Path:
 def find(prefix: str | os.PathLike[str] | None = None) -> Installation:
     """Return the installation in `prefix` (see `place`), checked as far as can be without starting it.
 
-    Raises
-    ------
-    InputError
-        If there is none, it was not finished, or what it was finished with has gone or is of another version.
+    InputError if there is none, it was not finished, or what it was finished with has gone or is of another version.
     """
     folder = place(prefix)
     manifest = read_manifest(folder)
@@ -105,7 +110,7 @@ def find(prefix: str | os.PathLike[str] | None = None) -> Installation:
         raise _unfit(f"{installation.gzserver} has gone", folder)
     for built in (installation.plugin, installation.confinement):
         if not built.is_file():
-            other = manifest.get("plugin") != build.folder_name()
+            other = manifest.get("plugin") != folder_name()
             problem = "is of another version of this package" if other else "has gone"
             raise _unfit(f"Gazebo's plugin {problem} ({built.name})", folder)
     return installation
@@ -128,7 +133,7 @@ def write_manifest(folder: Path, gzserver: Path, *, own: bool, version: str) -> 
         "gazebo": version,
         "gzserver": str(gzserver),
         "own": own,
-        "plugin": build.folder_name(),
+        "plugin": folder_name(),
     }
     files.write_text(folder / MANIFEST, json.dumps(manifest, indent=1) + "\n")
 
@@ -140,3 +145,94 @@ def _unfit(problem: str, folder: Path) -> InputError:
     return InputError(
         problem, file=str(folder), field="simulator", value="gazebo", expected=f"`{command}` first"
     )
+
+
+SOURCES: Final = Path(__file__).with_name("plugin")
+WORLD: Final = SOURCES / "world.cc"
+CONFINE: Final = SOURCES / "confine.cc"
+PLUGIN: Final = "libdubins_traffic_world.so"
+CONFINEMENT: Final = "libdubins_traffic_confine.so"
+OPTIONS: Final = ("-std=c++17", "-O1", "-fPIC", "-shared", "-w", f"-DDUBINS_TRAFFIC_PROTOCOL={PROTOCOL}")
+LIMIT: Final = 300.0
+"""Seconds after which a compiler is ended."""
+
+
+@cache
+def folder_name() -> str:
+    """Return the name of the folder for the libraries built from these sources."""
+    digest = hashlib.sha256(" ".join(OPTIONS).encode())
+    for source in (WORLD, CONFINE):
+        digest.update(source.read_bytes())
+    return f"plugin-{PROTOCOL}-{digest.hexdigest()[:12]}"
+
+
+def compiler() -> str:
+    """Return the C++ compiler: that of the variable CXX, else g++; InputError if there is none."""
+    name = os.environ.get("CXX") or "g++"
+    found = shutil.which(name)
+    if found is None:
+        raise InputError("no C++ compiler", field="CXX", value=name, expected="g++ 9 or newer (Debian: g++)")
+    return found
+
+
+def build(prefix: Path, root: Path | None) -> None:
+    """Compile both libraries into their folder in `prefix`, unless they are there.
+
+    Parameters
+    ----------
+    prefix : Path
+        Of the installation.
+    root : Path or None
+        Below which the headers are; None for those of the machine's own Gazebo.
+
+    Raises
+    ------
+    InputError
+        If it can't be compiled; says what the compiler said last.
+    """
+    folder = prefix / folder_name()
+    if (folder / PLUGIN).is_file() and (folder / CONFINEMENT).is_file():
+        return
+    includes = _own_flags() if root is None else _flags(root)
+    folder.mkdir(parents=True, exist_ok=True)
+    _compile(CONFINE, folder / CONFINEMENT, ["-ldl"])
+    _compile(WORLD, folder / PLUGIN, includes)
+
+
+def _flags(root: Path) -> list[str]:
+    include = root / "usr" / "include"
+    below = (
+        sorted(include.glob("gazebo-*"))
+        + sorted(include.glob("sdformat-*"))
+        + sorted(include.glob("ignition/*"))
+    )
+    folders = [include, *below, *(folder / "gazebo" for folder in below if folder.name.startswith("gazebo-"))]
+    return [f"-I{folder}" for folder in folders]
+
+
+def _own_flags() -> list[str]:
+    command = ["pkg-config", "--cflags", "gazebo"]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=True, timeout=30)
+    except (OSError, subprocess.SubprocessError) as error:
+        raise InputError(
+            "the headers of this machine's Gazebo can't be found",
+            value=" ".join(command),
+            expected="pkg-config and libgazebo-dev, or no gzserver on the path",
+        ) from error
+    return [flag for flag in shlex.split(done.stdout) if not flag.startswith("-std=")]
+
+
+def _compile(source: Path, target: Path, flags: list[str]) -> None:
+    neighbour = target.with_suffix(f".{os.getpid()}.tmp")
+    command = [compiler(), *OPTIONS, str(source), "-o", str(neighbour), *flags]
+    try:
+        done = subprocess.run(command, capture_output=True, text=True, check=False, timeout=LIMIT)
+        if done.returncode != 0:
+            said = " | ".join(line.strip() for line in done.stderr.splitlines() if "error" in line)[:600]
+            raise InputError(f"can't be compiled ({said or done.stderr[-300:]})", file=str(source))
+        neighbour.replace(target)
+    except subprocess.TimeoutExpired:
+        raise InputError(f"the compiler took more than {LIMIT:g} s", file=str(source)) from None
+    finally:
+        neighbour.unlink(missing_ok=True)

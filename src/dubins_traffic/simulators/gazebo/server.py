@@ -1,10 +1,15 @@
-"""One gzserver: started for one world, commanded over a socket that it inherits, and ended without leftovers."""
+"""One gzserver: started for one world, commanded over a socket that it inherits, and ended without leftovers.
+
+Its files lie in a folder that is removed with it, or by the next server where a process was killed.
+"""
 
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import re
+import shutil
 import signal
 import socket
 import subprocess
@@ -19,9 +24,51 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.simulators.gazebo.folder import Folder
 from dubins_traffic.simulators.gazebo.link import PROTOCOL, Kind, Link, LostError
 from dubins_traffic.simulators.gazebo.prefix import Installation
+
+PREFIX: Final = "dubins-traffic-gazebo-"
+
+
+class Folder:
+    """A new temporary folder of this process.
+
+    Its lock is held for as long as the process lives, however it ends: a folder whose lock is free is a forgotten one,
+    and whoever makes a new folder removes those.
+
+    Raises
+    ------
+    OSError
+        If none can be made.
+    """
+
+    def __init__(self) -> None:
+        _remove_forgotten()
+        while True:
+            self.path = Path(tempfile.mkdtemp(prefix=PREFIX))
+            with contextlib.suppress(FileNotFoundError):
+                self._lock = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
+                fcntl.flock(self._lock, fcntl.LOCK_EX)
+                if self.path.is_dir():
+                    return
+                os.close(self._lock)  # it was taken for a forgotten one before it was locked
+
+    def cleanup(self) -> None:
+        """Remove it."""
+        shutil.rmtree(self.path, ignore_errors=True)
+        os.close(self._lock)
+
+
+def _remove_forgotten() -> None:
+    """Remove the folders of processes of this user that were killed."""
+    for folder in Path(tempfile.gettempdir()).glob(f"{PREFIX}*"):
+        with contextlib.suppress(OSError), contextlib.ExitStack() as held:
+            lock = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_NOFOLLOW)
+            held.callback(os.close, lock)
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            if os.fstat(lock).st_uid == os.getuid():
+                shutil.rmtree(folder, ignore_errors=True)
+
 
 SOCKET: Final = "DUBINS_TRAFFIC_GAZEBO_SOCKET"
 PARENT: Final = "DUBINS_TRAFFIC_GAZEBO_PARENT"

@@ -18,13 +18,10 @@ from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.errors import InputError, PeerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.protocols import Capabilities, End
-from dubins_traffic.simulators.gazebo import vehicle
-from dubins_traffic.simulators.gazebo.contacts import Contacts
-from dubins_traffic.simulators.gazebo.export import outlook
-from dubins_traffic.simulators.gazebo.link import BODY, CONTACT, Kind, LostError
+from dubins_traffic.simulators.gazebo.link import BODY, CONTACT, Contacts, Kind, LostError
 from dubins_traffic.simulators.gazebo.prefix import find
 from dubins_traffic.simulators.gazebo.server import Server
-from dubins_traffic.simulators.gazebo.world import world
+from dubins_traffic.simulators.gazebo.world import BUMPER, Drive, outlook, world
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -107,7 +104,7 @@ class Gazebo:
         scenery = outlook(problem.network) if self._show else ()
         text = world(instance.starts, problem.car.body, problem.obstacles, step, plugin, scenery)
         self._lost = ""
-        self._drive = vehicle.Drive.below(problem.car.body)
+        self._drive = Drive.below(problem.car.body)
         self._rows = rows(pack_cars([problem.car]), cars, 1.0 / problem.rate)
         self._asked = np.zeros((2, cars))
         self._message = np.zeros(1 + 2 * cars)
@@ -149,7 +146,7 @@ class Gazebo:
 
     def scan(self, car: int, rays: Floats, longest: float) -> Floats:
         """Return how far the rays (R, 2), unit vectors in the frame of `car`, go: (R,), at most `longest` metres."""
-        message = np.concatenate(([car, vehicle.BUMPER, longest], rays.ravel()))
+        message = np.concatenate(([car, BUMPER, longest], rays.ravel()))
         try:
             return self._ask(Kind.SCAN, message).copy()
         except PeerError:

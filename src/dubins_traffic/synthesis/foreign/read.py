@@ -9,10 +9,15 @@ from typing import Any, Final
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import decoded, read_bytes
 from dubins_traffic.synthesis.foreign.aiger import is_aiger, read_aiger
+from dubins_traffic.synthesis.foreign.explicit import (
+    is_slugs_text,
+    is_tulip,
+    read_slugs_json,
+    read_slugs_text,
+    read_tulip,
+)
 from dubins_traffic.synthesis.foreign.hoa import is_hoa, read_hoa
 from dubins_traffic.synthesis.foreign.machine import MOST_BYTES, Machine
-from dubins_traffic.synthesis.foreign.slugs import is_slugs_text, read_slugs_json, read_slugs_text
-from dubins_traffic.synthesis.foreign.tulip import is_tulip, read_tulip
 
 FORMS: Final = "HOA, AIGER, slugs' JSON or explicit text, or TuLiP's Python file"
 
@@ -20,10 +25,7 @@ FORMS: Final = "HOA, AIGER, slugs' JSON or explicit text, or TuLiP's Python file
 def read_machine(path: str | Path) -> Machine:
     """Return the machine in a file; what it is in is told by its content.
 
-    Raises
-    ------
-    InputError
-        If it can't be read, is none of these, or is damaged.
+    InputError if it can't be read, is none of these, or is damaged.
     """
     name = str(path)
     data = read_bytes(name, most=MOST_BYTES)

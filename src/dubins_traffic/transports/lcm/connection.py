@@ -65,15 +65,9 @@ def url_of_its_own() -> Generator[str]:
 def connect(url: str) -> LCM:
     """Return an LCM connection.
 
-    Raises
-    ------
-    MissingExtraError
-        If the library is not installed.
-    TransportError
-        If the library does not load for want of another, or multicast packets have no way to go; the message holds the
-        commands that help.
-    InputError
-        If `url` is no URL of LCM.
+    MissingExtraError if the library is not installed; TransportError if the library does not load for want of
+    another, or multicast packets have no way to go; the message holds the commands that help; InputError if `url` is
+    no URL of LCM.
     """
     try:
         from lcm import LCM
@@ -93,12 +87,7 @@ def connect(url: str) -> LCM:
 def check_route(url: str) -> None:
     """See that packets to the multicast group of `url` have a way to go; other URLs than of multicast pass.
 
-    Raises
-    ------
-    TransportError
-        If they have none.
-    InputError
-        If the group is no address for multicast.
+    TransportError if they have none; InputError if the group is no address for multicast.
     """
     try:
         parts = urlsplit(url)

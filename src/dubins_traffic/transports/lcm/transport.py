@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 from dubins_traffic.errors import TransportError
 from dubins_traffic.protocols import End, Ending, Mailbox, View
 from dubins_traffic.rules.labels import Caption
-from dubins_traffic.transports.joining import closing_if_refused
 from dubins_traffic.transports.lcm import connection, encoding
 from dubins_traffic.transports.lcm.dubins_traffic_lcm import (
     command_t,
@@ -22,7 +21,7 @@ from dubins_traffic.transports.lcm.dubins_traffic_lcm import (
     labels_t,
     mode_t,
 )
-from dubins_traffic.transports.maestro import Maestro, Mode
+from dubins_traffic.transports.maestro import Maestro, Mode, closing_if_refused
 
 if TYPE_CHECKING:
     from lcm import LCMSubscription

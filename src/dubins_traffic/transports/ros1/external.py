@@ -17,7 +17,7 @@ from dubins_traffic.errors import ControllerError, InputError, TransportError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.protocols import Capabilities, End
-from dubins_traffic.transports.quaternion import placed
+from dubins_traffic.transports.ros import placed
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.transport import COMMANDS
 

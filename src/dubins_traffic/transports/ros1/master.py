@@ -14,7 +14,7 @@ from typing import Any
 from xmlrpc.client import ServerProxy, Transport
 
 from dubins_traffic.errors import TransportError
-from dubins_traffic.transports.ros1.debian import ros
+from dubins_traffic.transports.ros1.messages import ros
 
 PR_SET_PDEATHSIG = 1
 PATIENCE = 120.0

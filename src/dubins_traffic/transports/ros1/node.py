@@ -10,8 +10,8 @@ from time import sleep
 from typing import Any
 
 from dubins_traffic.errors import TransportError
-from dubins_traffic.transports.ros1.debian import ros
 from dubins_traffic.transports.ros1.master import answers
+from dubins_traffic.transports.ros1.messages import ros
 
 NAME = "dubins_traffic_maestro"
 REFEREE = "dubins_traffic_referee"

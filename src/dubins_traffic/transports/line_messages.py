@@ -1,13 +1,23 @@
-"""What a program may say in lines: two plain numbers and a tick are a command, and nothing else is."""
+"""Messages in JSON lines: observations, whose numbers keep their bits, and what a program may answer.
+
+Two plain numbers and a tick are a command, and nothing else is.
+"""
 
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, cast
 
+import numpy as np
+
+from dubins_traffic.cars.state import Observation, Pose, Propositions, SensedCar, Twist
 from dubins_traffic.errors import shown
 from dubins_traffic.protocols import End
+
+if TYPE_CHECKING:
+    from dubins_traffic.problem.instance import Problem
 
 LONGEST = 1 << 16
 """Bytes of a line above which it is no message."""
@@ -35,13 +45,7 @@ class Answer:
 
 
 def message_in(line: bytes) -> dict[str, Any]:
-    """Return the message of a line.
-
-    Raises
-    ------
-    AnswerError
-        If it is none, or says that the controller has given up or failed.
-    """
+    """Return the message of a line; AnswerError if it is none, or says that the controller has given up or failed."""
     try:
         message: Any = json.loads(line)
     except (ValueError, RecursionError):
@@ -76,10 +80,7 @@ def command_of(message: dict[str, Any]) -> Answer | None:
 def command_in(line: bytes, tick: int) -> Answer:
     """Return the command that answers frame `tick`.
 
-    Raises
-    ------
-    AnswerError
-        If the line is anything else, or says that the controller has given up or failed.
+    AnswerError if the line is anything else, or says that the controller has given up or failed.
     """
     answer = command_of(message_in(line))
     if answer is None:
@@ -117,3 +118,38 @@ def _reports(found: Any) -> tuple[tuple[str, str], ...]:
             case _:
                 raise AnswerError(End.PEER_GARBAGE, "a report is not a kind and a detail")
     return tuple(pairs)
+
+
+def observation_to_document(seen: Observation) -> dict[str, Any]:
+    """Return `seen` as lists of numbers; bodies are left out, since all cars of a problem are alike."""
+    return {
+        "tick": seen.tick,
+        "time": seen.time,
+        "pose": list(seen.pose),
+        "twist": list(seen.twist),
+        "propositions": list(seen.propositions),
+        "others": [
+            [car.name, car.index, list(car.pose), list(car.twist), list(car.propositions)]
+            for car in seen.others
+        ],
+        "scan": None if seen.scan is None else seen.scan.tolist(),
+    }
+
+
+def observation_from_document(document: Mapping[str, Any], problem: Problem) -> Observation:
+    """Return the observation, equal to the one that was written."""
+    body = problem.car.body
+    others = [
+        SensedCar(name, index, Pose(*pose), Twist(*twist), body, Propositions(*propositions))
+        for name, index, pose, twist, propositions in document["others"]
+    ]
+    scan = document["scan"]
+    return Observation(
+        document["tick"],
+        document["time"],
+        Pose(*document["pose"]),
+        Twist(*document["twist"]),
+        Propositions(*document["propositions"]),
+        tuple(others),
+        None if scan is None else np.array(scan, dtype=np.float64),
+    )

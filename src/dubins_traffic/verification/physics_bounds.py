@@ -11,9 +11,8 @@ from dubins_traffic.cars.state import Contact, Frames, State
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import Record
-from dubins_traffic.verification.bodies import Meetings, put_frame
 from dubins_traffic.verification.result import Difference
-from dubins_traffic.verification.worlds import MEASURED, by_tick
+from dubins_traffic.verification.worlds import MEASURED, Meetings, by_tick, put_frame
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""Who asks: a person who has logged in, a person's or a worker's token, or anybody."""
+"""Requests: who asks (who has logged in, the token of a person or a worker, or anybody), and how large they may be."""
 
 from __future__ import annotations
 
@@ -8,16 +8,19 @@ from typing import Any
 import anyio.to_thread
 from litestar.connection import ASGIConnection
 from litestar.di import NamedDependency
-from litestar.exceptions import NotAuthorizedException, PermissionDeniedException
+from litestar.exceptions import ClientException, NotAuthorizedException, PermissionDeniedException
+from litestar.exceptions.http_exceptions import RequestEntityTooLarge
 from litestar.handlers import BaseRouteHandler
 from litestar.middleware import AbstractAuthenticationMiddleware, AuthenticationResult
+from litestar.types import ASGIApp, HTTPReceiveMessage, Receive, Scope, Send
+from litestar.types.asgi_types import WebSocketReceiveMessage
 
 from dubins_traffic.service import accounts
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.tables import Account, Team
 
-OfficeHere = NamedDependency[Office]
-"""The office, as handlers are given it."""
+ServiceHere = NamedDependency[Service]
+"""The service, as handlers are given it."""
 Asked = ASGIConnection[Any, Any, Any, Any]
 BEARER = "bearer "
 PROGRAMS = ("/api/", "/worker/", "/metrics")
@@ -54,21 +57,21 @@ class Recognition(AbstractAuthenticationMiddleware):
 
     async def authenticate_request(self, connection: Asked) -> AuthenticationResult:
         """Return the viewer."""
-        office: Office = connection.app.state["office"]
+        service: Service = connection.app.state["service"]
         if connection.url.path.startswith(PROGRAMS):
             given = connection.headers.get("authorization", "")
             token = given[len(BEARER) :].strip() if given.lower().startswith(BEARER) else ""
-            viewer = await anyio.to_thread.run_sync(_by_token, office, token) if token else Viewer()
+            viewer = await anyio.to_thread.run_sync(_by_token, service, token) if token else Viewer()
             if token and viewer == Viewer():
                 raise NotAuthorizedException("the token is unknown or revoked")
         else:
             session = connection.session if "session" in connection.scope else {}
-            viewer = await anyio.to_thread.run_sync(_by_session, office, dict(session or {}))
+            viewer = await anyio.to_thread.run_sync(_by_session, service, dict(session or {}))
         return AuthenticationResult(user=viewer, auth=None)
 
 
-def _by_token(office: Office, token: str) -> Viewer:
-    with office.database.reading() as session:
+def _by_token(service: Service, token: str) -> Viewer:
+    with service.database.reading() as session:
         found = accounts.token_of(session, token)
         if found is None:
             return Viewer()
@@ -78,11 +81,11 @@ def _by_token(office: Office, token: str) -> Viewer:
         return Viewer(account, account.team)
 
 
-def _by_session(office: Office, data: dict[str, Any]) -> Viewer:
+def _by_session(service: Service, data: dict[str, Any]) -> Viewer:
     number = data.get("account")
     if not isinstance(number, int):
         return Viewer()
-    with office.database.reading() as session:
+    with service.database.reading() as session:
         account = session.get(Account, number)
         if account is None or account.removed is not None or account.epoch != data.get("epoch"):
             return Viewer()
@@ -107,3 +110,55 @@ def worker(connection: Asked, _handler: BaseRouteHandler) -> None:
     """Let in workers."""
     if not connection.user.worker:
         raise NotAuthorizedException("this is for workers, by their token")
+
+
+FORM = 64 << 10
+"""Bytes of a form, and of all else that is no file."""
+FILES = "takes_files"
+"""Option of the routes that take files, and long reports, of those who have a name or a token."""
+PARSED_AT_ONCE = b"application/x-www-form-urlencoded"
+
+
+class Bodies:
+    """Refuses a body that is too large before anything reads it, or as soon as too much of it has come.
+
+    Parameters
+    ----------
+    app : ASGIApp
+        What is asked then.
+    largest : int
+        Bytes of a file.
+    """
+
+    def __init__(self, app: ASGIApp, largest: int) -> None:
+        self._app, self._largest = app, largest
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Hand on a request, of whose body no more than it may have is received."""
+        most, come = self._most(scope), 0
+        told = dict(scope["headers"]).get(b"content-length", b"0")
+        if not told.isdigit():
+            raise ClientException("content-length: not a number")
+        if int(told[:20]) > most:
+            raise _too_large(most)
+
+        async def bounded() -> HTTPReceiveMessage | WebSocketReceiveMessage:
+            nonlocal come
+            message = await receive()
+            if message["type"] == "http.request":
+                come += len(message["body"])
+                if come > most:
+                    raise _too_large(most)
+            return message
+
+        await self._app(scope, bounded, send)
+
+    def _most(self, scope: Scope) -> int:
+        kind = dict(scope["headers"]).get(b"content-type", b"").lower()
+        known = "user" in scope and scope["user"] != Viewer()
+        takes = known and scope["route_handler"].opt.get(FILES, False)
+        return self._largest if takes and PARSED_AT_ONCE not in kind else FORM
+
+
+def _too_large(most: int) -> RequestEntityTooLarge:
+    return RequestEntityTooLarge(f"the body is larger than {most >> 10} KiB")

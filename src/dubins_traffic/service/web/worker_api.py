@@ -17,10 +17,10 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.judging import Owner
 from dubins_traffic.service import housekeeping, queue, submissions
 from dubins_traffic.service.hiding import replays_of
-from dubins_traffic.service.office import Office
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.tables import Chunk, Submission, Worker
-from dubins_traffic.service.web import bodies, viewer
-from dubins_traffic.service.web.viewer import OfficeHere
+from dubins_traffic.service.web import requests
+from dubins_traffic.service.web.requests import ServiceHere
 
 Digest = Annotated[str, PathParameter(pattern="^[0-9a-f]{64}$", examples=[Example(value="0" * 64)])]
 Text = Annotated[str, msgspec.Meta(max_length=60)]
@@ -88,91 +88,91 @@ class Report(msgspec.Struct, forbid_unknown_fields=True):
     trials: list[Result] | None = None
 
 
-class Doors(Controller):
+class WorkerApi(Controller):
     """What workers ask."""
 
     path = "/worker"
-    guards = [viewer.worker]  # noqa: RUF012
+    guards = [requests.worker]  # noqa: RUF012
     tags = ["workers"]  # noqa: RUF012
     include_in_schema = True
 
     @post("/lease", sync_to_thread=True, status_code=HTTP_200_OK)
-    def lease(self, office: OfficeHere, data: JSONBody[AskedFor]) -> Response[Leased | None]:
+    def lease(self, service: ServiceHere, data: JSONBody[AskedFor]) -> Response[Leased | None]:
         """Lease the next chunk; nothing if none waits."""
-        found = office.database.patiently(lambda session: _lease(office, session, data.name))
+        found = service.database.patiently(lambda session: _lease(service, session, data.name))
         if found is None:
             return Response(None, status_code=HTTP_204_NO_CONTENT)
         return Response(found)
 
     @get("/submissions/{digest:str}", sync_to_thread=True)
-    def submission(self, office: OfficeHere, digest: Digest) -> Response[bytes]:
+    def submission(self, service: ServiceHere, digest: Digest) -> Response[bytes]:
         """Return what a team has sent, by its SHA-256."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             if (
                 session.scalars(select(Submission.id).where(Submission.digest == digest).limit(1)).first()
                 is None
             ):
                 raise NotFoundException("no such submission")
-        return Response(office.storage.get(digest, "submissions"), media_type="application/octet-stream")
+        return Response(service.storage.get(digest, "submissions"), media_type="application/octet-stream")
 
     @post("/chunks/{number:int}/heartbeat", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
-    def heartbeat(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Held]) -> None:
+    def heartbeat(self, service: ServiceHere, number: FromPath[int], data: JSONBody[Held]) -> None:
         """Renew a lease."""
 
         def renew(session: Session) -> None:
             chunk = queue.held(session, number, data.token)
-            chunk.leased_until = office.clock() + office.settings.lease
-            _seen(session, chunk.worker, office.clock(), _busy(chunk))
+            chunk.leased_until = service.clock() + service.settings.lease
+            _seen(session, chunk.worker, service.clock(), _busy(chunk))
 
-        office.database.patiently(renew)
+        service.database.patiently(renew)
 
-    @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK, opt={bodies.FILES: True})
+    @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK, opt={requests.FILES: True})
     async def replay(
         self,
-        office: OfficeHere,
+        service: ServiceHere,
         number: FromPath[int],
         token: FromQuery[int],
         request: Request[Any, Any, Any],
     ) -> dict[str, str]:
         """Keep the page that replays a trial, packed by gzip, and return its SHA-256."""
-        with office.database.reading() as session:
+        with service.database.reading() as session:
             queue.held(session, number, token)
         data = await request.body()
         if not data.startswith(b"\x1f\x8b"):
             raise ClientException("a replay is packed by gzip")
-        return {"digest": await asyncio.to_thread(_keep_replay, office, number, data)}
+        return {"digest": await asyncio.to_thread(_keep_replay, service, number, data)}
 
     @post(
         "/chunks/{number:int}/done",
         sync_to_thread=True,
         status_code=HTTP_204_NO_CONTENT,
-        opt={bodies.FILES: True},
+        opt={requests.FILES: True},
     )
-    def done(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Report]) -> None:
+    def done(self, service: ServiceHere, number: FromPath[int], data: JSONBody[Report]) -> None:
         """End a lease with its results; they and what follows from them are kept together, or not at all."""
-        office.database.patiently(lambda session: _done(office, session, number, data))
+        service.database.patiently(lambda session: _done(service, session, number, data))
 
     @post("/chunks/{number:int}/release", sync_to_thread=True, status_code=HTTP_204_NO_CONTENT)
-    def release(self, office: OfficeHere, number: FromPath[int], data: JSONBody[Released]) -> None:
+    def release(self, service: ServiceHere, number: FromPath[int], data: JSONBody[Released]) -> None:
         """End a lease without a result: the chunk waits again."""
 
         def give_back(session: Session) -> None:
             chunk = queue.held(session, number, data.token)
             note = _note(chunk, data.note)
             if data.left:
-                queue.release(session, chunk, note, office.clock(), worker_left=True)
+                queue.release(session, chunk, note, service.clock(), worker_left=True)
             else:
-                housekeeping.give_back(session, chunk.id, note, office.clock())
-            _seen(session, chunk.worker, office.clock(), "")
+                housekeeping.give_back(session, chunk.id, note, service.clock())
+            _seen(session, chunk.worker, service.clock(), "")
 
-        office.database.patiently(give_back)
+        service.database.patiently(give_back)
 
 
-def _keep_replay(office: Office, number: int, data: bytes) -> str:
-    with office.database.reading() as session:
+def _keep_replay(service: Service, number: int, data: bytes) -> str:
+    with service.database.reading() as session:
         chunk = session.get_one(Chunk, number)
-        kept = office.hiding(chunk.submission.phase).hide(data, replays_of(chunk))
-    return office.storage.put(kept, "replays")
+        kept = service.hiding(chunk.submission.phase).hide(data, replays_of(chunk))
+    return service.storage.put(kept, "replays")
 
 
 def _note(chunk: Chunk, told: str) -> str:
@@ -180,44 +180,44 @@ def _note(chunk: Chunk, told: str) -> str:
     return told if chunk.submission.phase.shows == "all" else f"the log of worker {chunk.worker} says why"
 
 
-def _lease(office: Office, session: Session, name: str) -> Leased | None:
-    at = office.clock()
-    chunk = queue.take(session, name, at, office.settings.lease)
+def _lease(service: Service, session: Session, name: str) -> Leased | None:
+    at = service.clock()
+    chunk = queue.take(session, name, at, service.settings.lease)
     _seen(session, name, at, "" if chunk is None else _busy(chunk))
     if chunk is None:
         return None
     submission = chunk.submission
     submissions.taken(submission, chunk, at)
-    seeds = office.seeds(submission.phase) if chunk.numbers else ()
+    seeds = service.seeds(submission.phase) if chunk.numbers else ()
     return Leased(
         chunk=chunk.id,
         token=chunk.token,
-        seconds=office.settings.lease,
+        seconds=service.settings.lease,
         kind=chunk.kind,
         numbers=chunk.numbers,
         digest=submission.digest,
         phase=submission.phase.name,
-        competition=dict(office.competition(submission.phase.competition).document),
+        competition=dict(service.competition(submission.phase.competition).document),
         seeds={str(own): seeds[own] for own in chunk.numbers},
     )
 
 
-def _done(office: Office, session: Session, number: int, report: Report) -> None:
-    at = office.clock()
+def _done(service: Service, session: Session, number: int, report: Report) -> None:
+    at = service.clock()
     chunk = queue.held(session, number, report.token)
     submission = chunk.submission
     if report.rejected is not None and chunk.kind != "check":
         housekeeping.give_back(session, chunk.id, _note(chunk, report.rejected), at)
     elif chunk.kind != "check":
         results = [msgspec.to_builtins(own) for own in report.trials or ()]
-        submissions.record(session, chunk, results, at, office.hiding(submission.phase))
+        submissions.record(session, chunk, results, at, service.hiding(submission.phase))
     elif report.rejected is not None:
         queue.finish(session, chunk)
         submissions.reject(session, submission, report.rejected, at)
     else:
         queue.finish(session, chunk)
         submission.content = report.content
-        submissions.accept(session, submission, office.phase(submission.phase).numbers, at)
+        submissions.accept(session, submission, service.phase(submission.phase).numbers, at)
     _seen(session, chunk.worker, at, "")
 
 
