@@ -19,7 +19,7 @@ from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.marks import goal_numbers
 from dubins_traffic.viewer.raster_ground import Cover, blend, rgb
 from dubins_traffic.viewer.raster_kernel import MARK, Image, View, paint
-from dubins_traffic.viewer.scene import centre_paths, extent, lane_hints, obstacle_points, road_lines
+from dubins_traffic.viewer.scene import Extent, centre_paths, extent, lane_hints, obstacle_points, road_lines
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
@@ -209,12 +209,26 @@ def stop_lines(problem: Problem) -> list[tuple[Floats, Floats]]:
     return found
 
 
+def picture_size(problem: Problem, longer: int) -> tuple[int, int]:
+    """Return width and height of a picture that all roads fill, the longer side `longer` pixels; both are even."""
+    box = _box(problem)
+    width, height = box.width + 2.0 * MARGIN, box.height + 2.0 * MARGIN
+    sides = (max(SIZES[0], 2 * round(0.5 * longer * side / max(width, height))) for side in (width, height))
+    across, down = sides
+    return across, down
+
+
+def _box(problem: Problem) -> Extent:
+    """Return the box of all roads, goals and obstacles of a problem."""
+    reach = problem.intersection_radius
+    goals = problem.network.points[list(problem.goal_vertices)].reshape(-1, 2)
+    fixed = [goals - reach, goals + reach, *(obstacle_points(one) for one in problem.obstacles)]
+    return extent(problem.network, 0.5 * problem.car.road_width, *fixed)
+
+
 def _view(problem: Problem, width: int, height: int, chosen: int) -> View:
     """Return how all roads, goals and obstacles of a problem just fit into a picture."""
-    network, reach, body = problem.network, problem.intersection_radius, problem.car.body
-    goals = network.points[list(problem.goal_vertices)].reshape(-1, 2)
-    fixed = [goals - reach, goals + reach, *(obstacle_points(one) for one in problem.obstacles)]
-    box = extent(network, 0.5 * problem.car.road_width, *fixed)
+    body, box = problem.car.body, _box(problem)
     scale = min(width / (box.width + 2.0 * MARGIN), height / (box.height + 2.0 * MARGIN))
     side = float(min(width, height))
     grow = max(1.0, min(5.0, 0.0125 * side) / (body.reach * scale))
