@@ -9,6 +9,7 @@ import sys
 from collections.abc import Iterator
 from io import BytesIO
 from pathlib import Path
+from time import process_time
 from types import ModuleType
 from typing import Any
 
@@ -123,6 +124,19 @@ def test_a_gif_of_a_minute_is_small_and_stores_changes_alone(record: dt.Record, 
         place = canvas[part.top : part.top + high, part.left : part.left + wide]
         place[...] = np.where(part.pixels == 255, place, part.pixels)
         assert (canvas == colours.numbers(image)).all()
+
+
+def test_a_gif_takes_at_most_twice_what_pillow_takes_for_the_same_pictures(
+    record: dt.Record, tmp_path: Path
+) -> None:
+    found = dt.animate(record, stop=8.0)
+    images = [Pictures.fromarray(image) for image in found]
+    begun = process_time()
+    images[0].save(tmp_path / "pillow.gif", save_all=True, append_images=images[1:], duration=100, loop=0)
+    theirs = process_time() - begun
+    begun = process_time()
+    found.write(tmp_path / "ours.gif")
+    assert process_time() - begun < 2.0 * theirs
 
 
 def test_a_picture_that_changes_nothing_makes_the_one_before_last_longer(tmp_path: Path) -> None:
