@@ -259,7 +259,7 @@ class _Lit:
         while self._next < len(self._visits) and self._visits[self._next][0] <= frame:
             self._done.add(self._visits[self._next][1])
             self._next += 1
-            if self._done >= self._goals:
+            if self._goals.issubset(self._done):
                 self._done.clear()
         return sorted(self._done | ({at} & self._goals if at != NONE else set()))
 
