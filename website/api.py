@@ -35,7 +35,7 @@ GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
         "Scores and verdicts",
         ("score", "Score", "ScoreSheet", "Scorer", "Verdict", "Judging", "Metric", "Column"),
     ),
-    "pictures": ("Pictures and replays", ("plot", "write_plot", "write_replay")),
+    "pictures": ("Pictures and replays", ("plot", "write_plot", "write_replay", "animate", "Animation")),
     "learning": (
         "Learning",
         (

@@ -43,6 +43,7 @@ if TYPE_CHECKING:  # without the module `typing`: the program `dubins-traffic` h
     from dubins_traffic.scoring.verdict import Verdict
     from dubins_traffic.verification.result import Difference, Verification
     from dubins_traffic.verification.verify import verify
+    from dubins_traffic.viewer.animate import Animation, animate
     from dubins_traffic.viewer.plot import plot, write_plot
     from dubins_traffic.viewer.replay import write_replay
 
@@ -77,6 +78,7 @@ _PLACES = {
     "scoring.verdict": ("Verdict",),
     "verification.result": ("Difference", "Verification"),
     "verification.verify": ("verify",),
+    "viewer.animate": ("Animation", "animate"),
     "viewer.plot": ("plot", "write_plot"),
     "viewer.replay": ("write_replay",),
 }
@@ -89,6 +91,7 @@ _NAMES = {
 __version__: str
 
 __all__ = [
+    "Animation",
     "Batch",
     "Bounds",
     "CampaignResults",
@@ -135,6 +138,7 @@ __all__ = [
     "Verdict",
     "Verification",
     "__version__",
+    "animate",
     "draw",
     "estimate",
     "falsify",

@@ -36,6 +36,7 @@ COMMANDS = {
     "spec": (["spec", "one.json"], ".txt", "one.json"),
     "plot": (["plot", "t.mcap"], ".png", "t.mcap"),
     "replay": (["replay", "t.mcap"], ".html", "t.mcap"),
+    "replay as a moving picture": (["replay", "t.mcap", "--size", "64"], ".gif", "t.mcap"),
     "convert a record": (["convert", "t.mcap"], ".csv", "t.mcap"),
     "convert to a bag": (["convert", "t.mcap"], ".bag", "t.mcap"),
     "convert a network": (["convert", "grid.json"], ".rnd", "grid.json"),
@@ -80,7 +81,7 @@ def test_a_command_replaces_nothing_that_it_was_not_told_to(
         os.link(place / read, place / f"twin{suffix}")
     (place / f"way{suffix}").symlink_to("my.py")
     before = held(place)
-    wrong = ["my.py", "x.mp4", "t.mcap", f"way{suffix}", *([] if read is None else [read, f"twin{suffix}"])]
+    wrong = ["my.py", "x.mp3", "t.mcap", f"way{suffix}", *([] if read is None else [read, f"twin{suffix}"])]
     for output in wrong:
         for more in ([], ["--overwrite"]):
             assert main([*words, "-o", output, *more]) == 2, (output, more)

@@ -99,7 +99,7 @@ def test_opens_and_shows_the_trial(page: webdriver.Chrome, trial: tuple[Instance
         "const c = document.getElementById('map');"
         "const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data;"
         "const seen = new Set(); for (let i = 0; i < d.length; i += 4) seen.add(d[i] << 16 | d[i+1] << 8 | d[i+2]);"
-        "return seen.has(0x0072b2) && seen.has(0xcdd1d7) && seen.has(0xe69f00)"
+        "return seen.has(0x0072b2) && seen.has(0xcfd3d8) && seen.has(0xe69f00)"
     )
     assert colours is True
 

@@ -5,6 +5,8 @@ from __future__ import annotations
 import subprocess
 import sys
 from collections import Counter
+from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import gymnasium
@@ -258,3 +260,32 @@ def test_a_discrete_action_of_another_shape_is_refused(action: Any) -> None:
     if action != [3]:
         with pytest.raises(InputError, match=r"action: not an action"):
             many.step(action)
+
+
+def test_gymnasiums_recorder_of_videos_takes_what_is_painted(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its encoder, moviepy, stands for itself: it asks for a Pillow older than ours."""
+    written: dict[str, tuple[int, float]] = {}
+
+    class Sequence:
+        def __init__(self, frames: list[Any], fps: float) -> None:
+            self.frames, self.fps = frames, fps
+
+        def write_videofile(self, path: str, **_given: Any) -> None:
+            assert all(frame.dtype == np.uint8 and frame.shape == (80, 120, 3) for frame in self.frames)
+            assert (self.frames[0] != self.frames[-1]).any()
+            written[Path(path).name] = (len(self.frames), self.fps)
+
+    clip = ModuleType("moviepy.video.io.ImageSequenceClip")
+    clip.ImageSequenceClip = Sequence  # pyright: ignore[reportAttributeAccessIssue]
+    for name in ("moviepy", "moviepy.video", "moviepy.video.io"):
+        monkeypatch.setitem(sys.modules, name, ModuleType(name))
+    monkeypatch.setitem(sys.modules, clip.__name__, clip)
+    own = gymnasium.make("dubins_traffic/Town-v0", render_mode="rgb_array", width=120, height=80)
+    env = gymnasium.wrappers.RecordVideo(own, str(tmp_path / "videos"), episode_trigger=lambda _: True)
+    env.reset(seed=1)
+    for _ in range(20):
+        env.step(env.action_space.sample())
+    env.close()
+    assert written == {"rl-video-episode-0.mp4": (21, own.metadata["render_fps"])}

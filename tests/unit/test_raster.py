@@ -21,9 +21,10 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.live import png
-from dubins_traffic.viewer.raster import Raster, stop_lines
+from dubins_traffic.viewer.raster import Raster
 from dubins_traffic.viewer.raster_ground import rgb
 from dubins_traffic.viewer.raster_kernel import MARKS, Image
+from dubins_traffic.viewer.shapes import stop_lines
 from tests.synthetic import instance, obstacles_beside
 
 GRID = RoadNetwork.grid(3, 4)

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import matplotlib
 import pytest
+from PIL import Image
 
 from dubins_traffic.cli.main import main
 from tests.rules_scripts import Frame, flags, instance, label
@@ -56,10 +57,17 @@ def test_the_trial_of_the_readme_is_what_its_commands_draw(
     page = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     commands = [
         found.split()[1:]
-        for found in re.findall(r"`(dubins-traffic (?:run|plot) [^`]*\bfirst\b[^`]*)`", page)
+        for found in re.findall(r"`(dubins-traffic (?:run|replay|plot) [^`]*\bfirst\b[^`]*)`", page)
     ]
-    assert [words[0] for words in commands] == ["run", "plot"]
-    assert [main(words) for words in commands] == [0, 0]
+    assert [words[0] for words in commands] == ["run", "replay", "plot"]
+    assert [main(words) for words in commands] == [0, 0, 0]
+    assert (PICTURES / "trial.gif").stat().st_size < 1_000_000
+    with Image.open(tmp_path / "trial.gif") as made, Image.open(PICTURES / "trial.gif") as kept:
+        assert made.n_frames == kept.n_frames == 301  # pyright: ignore[reportAttributeAccessIssue]
+        for number in range(0, 301, 50):
+            made.seek(number)
+            kept.seek(number)
+            assert made.convert("RGB").tobytes() == kept.convert("RGB").tobytes()
     assert (tmp_path / "trial.svg").read_bytes() == (PICTURES / "trial.svg").read_bytes()
 
 

@@ -2,43 +2,122 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from dubins_traffic.cli import options
+from dubins_traffic.errors import InputError
 
-EXAMPLES = options.examples("replay out/trial-0000.mcap", "replay out/trial-0000.mcap -o trial.html")
+EXAMPLES = options.examples(
+    "replay out/trial-0000.mcap",
+    "replay out/trial-0000.mcap -o trial.html",
+    "replay out/trial-0000.mcap -o trial.gif --speed 4 --to 60",
+)
 
 
 def replay(
     record: options.Record,
     output: Annotated[
         str | None,
-        typer.Option("--output", "-o", metavar="FILE.html", help="The page.", show_default="RECORD.html"),
+        typer.Option(
+            "--output",
+            "-o",
+            metavar="FILE",
+            help="A page, .html, or a moving picture: .gif, .png, .mp4 or .webm.",
+            show_default="RECORD.html",
+        ),
+    ] = None,
+    fps: Annotated[
+        float | None,
+        typer.Option(
+            "--fps",
+            metavar="N",
+            help="Pictures a second of a moving picture.",
+            show_default="10, of a video 30",
+        ),
+    ] = None,
+    speed: Annotated[
+        float | None,
+        typer.Option(
+            "--speed",
+            metavar="X",
+            help="Seconds of the trial in a second of a moving picture.",
+            show_default="1",
+        ),
+    ] = None,
+    start: Annotated[
+        float | None,
+        typer.Option(
+            "--from",
+            metavar="S",
+            help="First second of the trial in a moving picture.",
+            show_default="its first",
+        ),
+    ] = None,
+    stop: Annotated[
+        float | None,
+        typer.Option(
+            "--to", metavar="S", help="Last second of the trial in a moving picture.", show_default="its last"
+        ),
+    ] = None,
+    size: Annotated[
+        int | None,
+        typer.Option("--size", metavar="PIXELS", help="Longer side of a moving picture.", show_default="480"),
     ] = None,
     overwrite: options.Replace = False,
 ) -> None:
-    """Make one self-contained page that replays a trial in a browser: play, pause, scrub, speed, trails."""
+    """Make a self-contained page that replays a trial in a browser, or a moving picture of it."""
+    from dubins_traffic.cli.progress import progress
     from dubins_traffic.cli.tables import summary
     from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.score import score
+    from dubins_traffic.viewer.animate import (
+        CODECS,
+        FPS,
+        SIZE,
+        SUFFIXES,
+        VIDEO_FPS,
+        Animation,
+        require_moving,
+    )
     from dubins_traffic.viewer.marks import formula_marks
     from dubins_traffic.viewer.pages import PAGES
     from dubins_traffic.viewer.replay import write_replay
 
     output = output or options.beside(record, ".html")
-    options.require(output, "a page", PAGES, overwrite=overwrite, apart_from=[record])
+    suffix = Path(output).suffix.lower()
+    require_moving(output, overwrite=overwrite, apart_from=[record], others=PAGES)
+    if suffix not in SUFFIXES:
+        given = {"--fps": fps, "--speed": speed, "--from": start, "--to": stop, "--size": size}
+        for name, value in given.items():
+            if value is not None:
+                expected = "no such option for a page, which plays the whole trial at any speed"
+                raise InputError("of a moving picture", field=name, value=value, expected=expected)
     found = load_record(record)
     scored = score(found)
-    write_replay(
-        output,
-        found.instance,
-        found.frames,
-        found.ending,
-        summary(scored),
-        formula_marks(scored.formulas),
-        scored.verdict,
-        overwrite=overwrite,
-    )
+    if suffix not in SUFFIXES:
+        write_replay(
+            output,
+            found.instance,
+            found.frames,
+            found.ending,
+            summary(scored),
+            formula_marks(scored.formulas),
+            scored.verdict,
+            overwrite=overwrite,
+        )
+    else:
+        moving = Animation(
+            found,
+            fps=(VIDEO_FPS if suffix in CODECS else FPS) if fps is None else fps,
+            speed=1.0 if speed is None else speed,
+            start=start,
+            stop=stop,
+            size=SIZE if size is None else size,
+            verdict=scored.verdict,
+        )
+        with progress(len(moving), what="pictures") as tell:
+            moving.write(output, overwrite=overwrite, progress=tell)
     options.tell(output)

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from functools import cache
 from io import BytesIO
-from typing import Any
+from itertools import groupby
+from typing import Any, cast
 
 import numpy as np
 
-from dubins_traffic.cars.body import Car, DiscObstacle, Obstacle
+from dubins_traffic.cars.body import Car
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.bodies import nose, outline
-from dubins_traffic.viewer.marks import Mark, goal_numbers
-from dubins_traffic.viewer.scene import Extent, centre_paths, extent, lane_hints, road_lines, short
+from dubins_traffic.viewer import palette, shapes
+from dubins_traffic.viewer.marks import Mark
+from dubins_traffic.viewer.scene import Extent, extent
+from dubins_traffic.viewer.shapes import Circle, Line, Region, Shape, Sign, Text, Width
 
 SIDE_RANGE = (4.5, 13.0)
 INCHES_PER_METRE = 0.55
 MARGIN = 0.5
-KERB = 0.03
-LABEL_POINTS = 8.0
 LEGEND_COLUMN = 1.15
 LEGEND_ROW = 0.2
 METADATA: dict[str, dict[str, Any]] = {
@@ -53,8 +52,7 @@ class Canvas:
 
     def __init__(self, network: RoadNetwork, car: Car, spans: Sequence[Floats]) -> None:
         self.network, self.car = network, car
-        half = 0.5 * car.road_width
-        box = extent(network, half, *spans)
+        box = extent(network, 0.5 * car.road_width, *spans)
         self.box = Extent(box.left - MARGIN, box.bottom - MARGIN, box.right + MARGIN, box.top + MARGIN)
         longest = max(self.box.width, self.box.height)
         inches = min(max(INCHES_PER_METRE * longest, SIDE_RANGE[0]), SIDE_RANGE[1])
@@ -64,103 +62,143 @@ class Canvas:
         self.axes: Any = self.figure.add_axes((0.0, 0.0, 1.0, 1.0))
         self.handles: list[tuple[str, Any]] = []
         self.things: dict[str, Any] = {}
+        self.order = 1.0
+
+    def draw(self, drawn: Iterable[Shape]) -> dict[str, Any]:
+        """Draw shapes over what is there, and return by their labels what a legend shows of them."""
+        shown: dict[str, Any] = {}
+        for look, run in groupby(drawn, key=self._look):
+            self.order += 0.01
+            if look is not None:
+                self._lines([shape for shape in run if isinstance(shape, Line)])
+                continue
+            for shape in run:
+                if isinstance(shape, Text):
+                    self._text(shape)
+                elif not isinstance(shape, Line):
+                    patch = self._sign(shape) if isinstance(shape, Sign) else self._patch(shape)
+                    if shape.label is not None:
+                        shown.setdefault(shape.label, patch)
+        return shown
+
+    def _look(self, shape: Shape) -> tuple[Any, ...] | None:
+        """Return what lines have in common that are drawn together; None for other shapes."""
+        return (shape.colour, shape.width, shape.dash, shape.opacity) if isinstance(shape, Line) else None
+
+    def _lines(self, lines: Sequence[Line]) -> None:
+        """Draw lines that look the same."""
+        from matplotlib.collections import LineCollection
+        from matplotlib.lines import Line2D
+
+        first = lines[0]
+        width = first.width.at(self.points)
+        end, opacity = "round" if first.round else "butt", first.opacity_at(self.points)
+        if len(lines) == 1 and first.dash is None:
+            line = Line2D(
+                *np.asarray(first.points).T, color=first.colour, linewidth=width, alpha=opacity, zorder=self.order,
+                solid_capstyle=cast(Any, end), solid_joinstyle="round",
+            )  # fmt: skip
+            self.axes.add_line(line)
+            return
+        style: Any = "solid"
+        if first.dash is not None:
+            style = [(0.0, tuple(part * self.points / width for part in first.dash))]
+        group = LineCollection(
+            [np.asarray(line.points) for line in lines],
+            linewidths=width,
+            colors=first.colour,
+            linestyles=style,
+            alpha=opacity,
+            capstyle=cast(Any, end),
+            joinstyle="round",
+            zorder=self.order,
+        )
+        self.axes.add_collection(group, autolim=False)
+
+    def _patch(self, shape: Region | Circle) -> Any:
+        from matplotlib.colors import to_rgba
+        from matplotlib.patches import Circle as Disc
+        from matplotlib.patches import Polygon
+
+        look: dict[str, Any] = {
+            "edgecolor": shape.edge or "none",
+            "linewidth": shape.width,
+            "zorder": self.order,
+        }
+        if isinstance(shape, Region):
+            patch: Any = Polygon(shape.points, closed=True, facecolor=shape.fill, **look)
+        else:
+            face = to_rgba(shape.fill, shape.opacity)
+            patch = Disc((shape.x, shape.y), shape.radius, facecolor=face, **look)
+        self.axes.add_patch(patch)
+        return patch
+
+    def _sign(self, sign: Sign) -> Any:
+        (mark,) = self.axes.plot(
+            [sign.x],
+            [sign.y],
+            linestyle="none",
+            marker={"contact": "X", "breach": "^"}[sign.kind],
+            markersize=min(9.0, max(5.0, 0.3 * self.points)),
+            markerfacecolor=sign.fill,
+            markeredgecolor=sign.edge,
+            markeredgewidth=0.8,
+            zorder=self.order,
+        )
+        return mark
+
+    def _text(self, text: Text) -> None:
+        from matplotlib.patheffects import withStroke
+
+        size = text.size_at(self.points)
+        if size == 0.0:
+            return
+        self.axes.text(
+            text.x,
+            text.y,
+            text.words,
+            fontsize=size,
+            color=text.colour,
+            ha="center",
+            va="center",
+            zorder=self.order,
+            fontweight="bold" if text.bold else "normal",
+            path_effects=[withStroke(linewidth=1.4, foreground="white")] if text.halo else None,
+            parse_math=False,
+            clip_on=True,
+        )
 
     def roads(self) -> None:
         """Draw surfaces with kerbs, centre lines, hints of directions and lattice points."""
-        from matplotlib.collections import LineCollection
+        network, car = self.network, self.car
+        self.draw([*shapes.roads(network, car), *shapes.centres(network, car), *shapes.hints(network, car)])
+        self.draw(shapes.places(network, car))
 
-        network, half = self.network, 0.5 * self.car.road_width
-        lines = road_lines(network)
-        thin = max(0.35, KERB * self.points)
-        for width, colour in (
-            (2.0 * half * self.points + 2.0 * thin, palette.KERB_COLOUR),
-            (2.0 * half * self.points, palette.ROAD_COLOUR),
-        ):
-            surface = LineCollection(list(lines), linewidths=width, colors=colour, capstyle="round", zorder=1)
-            self.axes.add_collection(surface, autolim=False)
-        stroke = min(1.8, max(0.3, 0.05 * self.points))
-        centre = LineCollection(
-            centre_paths(network, half),
-            linewidths=stroke,
-            colors=palette.LINE_COLOUR,
-            linestyles=[(0.0, (0.2 * self.points / stroke, 0.16 * self.points / stroke))],
-            zorder=2,
-        )
-        self.axes.add_collection(centre, autolim=False)
-        hints = LineCollection(
-            list(lane_hints(network, self.car.w)),
-            linewidths=stroke * 0.8,
-            colors=palette.HINT_COLOUR,
-            capstyle="round",
-            joinstyle="round",
-            zorder=2,
-        )
-        self.axes.add_collection(hints, autolim=False)
-        size = min(LABEL_POINTS, 0.3 * 2.0 * half * self.points)
-        if size >= 2.5:
-            for (x, y), place in zip(network.intersections, network.points, strict=True):
-                self._text(place, f"{short(x)},{short(y)}", size, palette.FAINT_COLOUR, 3)
+    def problem(self, problem: Problem) -> None:
+        """Draw the goals' discs and the obstacles; `names` numbers the goals."""
+        self.things |= self.draw([*shapes.goals(problem), *shapes.obstacles(problem)])
 
-    def goals(self, problem: Problem) -> None:
-        """Draw the goals' discs, numbered in the order in which they are given."""
-        from matplotlib.patches import Circle
+    def names(self, problem: Problem) -> None:
+        """Write the names of the goals."""
+        radius = problem.intersection_radius
+        self.draw(shapes.goal_names(problem, Width(0.34 * radius, 3.0, 9.0), lift=0.62 * radius))
 
-        for vertex, numbers in goal_numbers(problem).items():
-            place = self.network.points[vertex]
-            disc = Circle(
-                (float(place[0]), float(place[1])),
-                problem.intersection_radius,
-                facecolor=palette.GOAL_COLOUR + "38",
-                edgecolor=palette.GOAL_COLOUR,
-                linewidth=1.4,
-                zorder=2.5,
-            )
-            self.axes.add_patch(disc)
-            self.things.setdefault("goal", disc)
-            size = min(9.0, 0.34 * problem.intersection_radius * self.points)
-            if size >= 3.0:
-                lift = np.array([0.0, 0.62 * problem.intersection_radius])
-                self._text(place + lift, f"goal {numbers}", size, "#00684B", 6, bold=True)
-
-    def obstacles(self, obstacles: Sequence[Obstacle]) -> None:
-        """Draw obstacles, hatched."""
-        from matplotlib.patches import Circle, Polygon
-
-        look: dict[str, Any] = {
-            "facecolor": palette.OBSTACLE_COLOUR,
-            "edgecolor": palette.INK_COLOUR,
-            "linewidth": 0.8,
-            "zorder": 3.5,
-        }
-        for obstacle in obstacles:
-            if isinstance(obstacle, DiscObstacle):
-                patch: Any = Circle((obstacle.x, obstacle.y), obstacle.radius, **look)
-            else:
-                patch = Polygon(np.asarray(obstacle.vertices), closed=True, **look)
-            self.axes.add_patch(patch)
-            self.things.setdefault("obstacle", patch)
-
-    def cars(self, instance: Instance, poses: Sequence[Pose], *, ghost: bool = False) -> None:
-        """Draw bodies with their headings; a `ghost` is an outline, for starts beside ends.
+    def cars(self, instance: Instance, poses: Sequence[Pose]) -> None:
+        """Draw bodies with their headings.
 
         So many cars that colours come again bear their names, and only the ego stands in the legend.
         """
         crowd = len(poses) > 1 + len(palette.AGENT_COLOURS)
-        for index, (name, pose) in reversed(list(enumerate(zip(instance.names, poses, strict=True)))):
-            colour = palette.car_colour(index)
-            body = outline(self.car.body, pose)
-            fill, edge = ("white", colour) if ghost else (colour, palette.INK_COLOUR)
-            order = 5 if ghost else 6
-            (shape,) = self.axes.fill(*body.T, facecolor=fill, edgecolor=edge, linewidth=1.0, zorder=order)
-            tip = nose(self.car.body, pose)
-            self.axes.fill(*tip.T, facecolor=edge if ghost else "white", edgecolor="none", zorder=order)
-            if ghost:
-                continue
-            if crowd:
-                above = np.array([pose.x, pose.y + self.car.body.reach + 5.0 / self.points])
-                self._text(above, name, 5.5, palette.INK_COLOUR, 9, halo=True)
-            if index == 0 or not crowd:
-                self.handles.append((name, shape))
+        names = instance.names
+        shown = self.draw(shapes.cars(self.car.body, names, poses))
+        self.handles += [(name, patch) for name, patch in shown.items() if name == names[0] or not crowd]
+        if crowd:
+            lift, ink = self.car.body.reach + 5.0 / self.points, palette.INK_COLOUR
+            size = Width(5.5 / self.points, 0.0, 5.5)
+            self.draw(
+                Text(pose.x, pose.y + lift, name, ink, size, halo=True)
+                for name, pose in reversed(list(zip(names, poses, strict=True)))
+            )
 
     def trial(
         self,
@@ -173,23 +211,9 @@ class Canvas:
         """Draw the paths of all cars, where they began and ended, contacts and breaches."""
         from matplotlib.lines import Line2D
 
-        width = min(2.2, max(0.7, 0.07 * self.points))
-        for index, line in reversed(list(enumerate(lines))):
-            path = Line2D(
-                line[:, 0],
-                line[:, 1],
-                color=palette.car_colour(index),
-                linewidth=width * (1.35 if index == 0 else 1.0),
-                alpha=0.9,
-                solid_capstyle="round",
-                solid_joinstyle="round",
-                zorder=4.5 if index == 0 else 4,
-            )
-            self.axes.add_line(path)
-        self.cars(instance, starts, ghost=True)
+        self.draw([*shapes.ways(lines), *shapes.cars(self.car.body, instance.names, starts, ghost=True)])
         self.cars(instance, ends)
-        for mark in marks:
-            self._mark(mark)
+        self.things |= self.draw(shapes.signs(marks))
         start = Line2D(
             [], [], linestyle="none", marker="o", markerfacecolor="none", markeredgecolor="#555555"
         )
@@ -197,30 +221,6 @@ class Canvas:
             [], [], linestyle="none", marker="o", markerfacecolor="#555555", markeredgecolor="#222222"
         )
         self.things |= {"start": start, "end": end}
-
-    def _mark(self, mark: Mark) -> None:
-        if mark.point is None:
-            return
-        own, size = mark.car == 0, min(9.0, max(5.0, 0.3 * self.points))
-        breach = palette.BREACH_COLOURS[not own]
-        looks = {
-            "contact": ("X", palette.CONTACT_COLOUR, "white"),
-            "breach": ("^", breach if own else "white", breach),
-        }
-        names = {"contact": "contact", "breach": "breach of the ego" if own else "breach of others"}
-        marker, fill, edge = looks[mark.kind]
-        (sign,) = self.axes.plot(
-            [mark.point[0]],
-            [mark.point[1]],
-            linestyle="none",
-            marker=marker,
-            markersize=size,
-            markerfacecolor=fill,
-            markeredgecolor=edge,
-            markeredgewidth=0.8,
-            zorder=8,
-        )
-        self.things.setdefault(names[mark.kind], sign)
 
     def finish(self, title: str) -> None:
         """Set the frame, the scale, the title and the legend; the figure's size follows from the roads."""
@@ -260,32 +260,4 @@ class Canvas:
             handlelength=1.3,
             handleheight=1.0,
             columnspacing=1.4,
-        )
-
-    def _text(
-        self,
-        place: Floats,
-        text: str,
-        size: float,
-        colour: str,
-        order: float,
-        *,
-        bold: bool = False,
-        halo: bool = False,
-    ) -> None:
-        from matplotlib.patheffects import withStroke
-
-        self.axes.text(
-            float(place[0]),
-            float(place[1]),
-            text,
-            fontsize=size,
-            color=colour,
-            ha="center",
-            va="center",
-            zorder=order,
-            fontweight="bold" if bold else "normal",
-            path_effects=[withStroke(linewidth=1.4, foreground="white")] if halo else None,
-            parse_math=False,
-            clip_on=True,
         )

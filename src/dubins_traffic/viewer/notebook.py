@@ -1,4 +1,7 @@
-"""How notebooks show values: a picture and a few numbers as HTML, without scripts and without anything to load."""
+"""How notebooks show values: a picture and a few numbers as HTML, without anything to load; a record can be played.
+
+Only the player of a record has a script. It is a page of its own within the notebook's, which reaches nothing else.
+"""
 
 from __future__ import annotations
 
@@ -17,11 +20,14 @@ from dubins_traffic.viewer import svg
 from dubins_traffic.viewer.marks import Mark, breach_marks, contact_mark, verdict_text
 from dubins_traffic.viewer.pages import render
 from dubins_traffic.viewer.paths import Paths
+from dubins_traffic.viewer.replay import replay_page
 
 ROWS = 12
 """Most rows of a table."""
 MARKS = 200
 """Most contacts, and most breaches, that are drawn."""
+PLAYED = 8 << 20
+"""Most characters of a player: notebooks keep them; of a longer trial the picture is shown alone."""
 
 
 class Sheeted(Tabulated):
@@ -62,14 +68,19 @@ def html_of(subject: object) -> str:
 
 
 def record_html(record: Record) -> str:
-    """Return the HTML of a record: all paths, contacts, and where the cars ended."""
+    """Return the HTML of a record: a player, and beneath it all paths, contacts, and where the cars ended."""
     caption = repr(record).strip("<>").removeprefix("Record")
     if len(record.frames) == 0:
         return _page(svg.trial_picture(record.instance), "Record", caption.strip(": "))
     marks = [contact_mark(record.instance, contact) for contact in record.frames.contacts[:MARKS]]
     own = Paths.of(record.instance, record.frames)
     picture = svg.trial_picture(record.instance, own.last, own.lines(), marks)
-    return _page(picture, "Record", caption.strip(": "))
+    player = replay_page(record.instance, record.frames, record.ending)
+    if len(player) > PLAYED:
+        return _page(picture, "Record", caption.strip(": "))
+    return render(
+        "viewer/player.html", player=player, picture=picture, heading="Record", caption=caption.strip(": ")
+    )
 
 
 def trial_html(

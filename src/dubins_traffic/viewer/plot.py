@@ -154,6 +154,7 @@ def _draw(subject: Subject | Run) -> Any:
     if isinstance(subject, Instance):
         canvas = _ground(subject, ())
         canvas.cars(subject, subject.starts)
+        canvas.names(subject.problem)
         canvas.finish(f"{_heading(subject)}, {subject.duration:g} s")
         return canvas.figure
     instance = subject.instance
@@ -165,6 +166,7 @@ def _draw(subject: Subject | Run) -> Any:
         marks = [contact_mark(instance, contact) for contact in frames.contacts]
         canvas = _ground(instance, whole)
         canvas.trial(instance, whole, poses_at(frames, 0), poses_at(frames, len(frames) - 1), marks)
+        canvas.names(instance.problem)
         span = (len(frames) - 1) / frames.rate
         how = "cut off" if subject.ending is None else subject.ending.end.value.replace("_", " ")
         canvas.finish(f"{_heading(instance)}, {span:.4g} s, end: {how}")
@@ -173,6 +175,7 @@ def _draw(subject: Subject | Run) -> Any:
     breaches = () if score.verdict is None else breach_marks(instance, score.verdict.violations)
     canvas = _ground(instance, own.lines())
     canvas.trial(instance, own.lines(), instance.starts, own.last or instance.starts, breaches)
+    canvas.names(instance.problem)
     canvas.finish(f"{_heading(instance)}, {score.duration_s:.4g} s, {score.summary}")
     return canvas.figure
 
@@ -189,6 +192,5 @@ def _ground(instance: Instance, lines: Sequence[Floats]) -> Canvas:
     spans += [poses - problem.car.body.reach, poses + problem.car.body.reach, *lines]
     canvas = Canvas(problem.network, problem.car, spans)
     canvas.roads()
-    canvas.goals(problem)
-    canvas.obstacles(problem.obstacles)
+    canvas.problem(problem)
     return canvas

@@ -5,21 +5,22 @@ They look like the replay page: the same colours, the same marks, the same goals
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import groupby
 from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
-from dubins_traffic.cars.body import Disc, DiscObstacle
+from dubins_traffic.cars.body import Disc
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.viewer import palette
+from dubins_traffic.viewer import palette, shapes
 from dubins_traffic.viewer.marks import goal_numbers
 from dubins_traffic.viewer.raster_ground import Cover, blend, rgb
 from dubins_traffic.viewer.raster_kernel import MARK, Image, View, paint
-from dubins_traffic.viewer.scene import centre_paths, extent, lane_hints, obstacle_points, road_lines
+from dubins_traffic.viewer.scene import Extent, extent, obstacle_points
+from dubins_traffic.viewer.shapes import Circle, Line, Region, Shape, Text
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
@@ -28,7 +29,6 @@ SIZES: Final = (16, 4096)
 """Fewest and most pixels of a side."""
 MARGIN: Final = 0.3
 """Metres around the roads."""
-GOAL_INK: Final = "#00684B"
 COLOURS: Final = (
     palette.INK_COLOUR,
     "#FFFFFF",
@@ -131,90 +131,102 @@ class Raster:
         view = self._view
         return (x - view.left) * view.scale, (view.top - y) * view.scale
 
-    def _cover(self) -> Cover:
-        return Cover(self.width, self.height)
-
     def _roads(self) -> Image:
         """Return roads with kerbs, centre lines, directions of lanes and stop lines."""
-        problem, scale = self._problem, self._view.scale
+        problem = self._problem
         network, car = problem.network, problem.car
         picture = np.broadcast_to(rgb(palette.GROUND_COLOUR), (self.height, self.width, 3)).copy()
-        half = 0.5 * car.road_width * scale
-        for colour, wide in (
-            (palette.KERB_COLOUR, half + max(0.03 * scale, 0.8)),
-            (palette.ROAD_COLOUR, half),
-        ):
-            roads = self._cover()
-            for first, last in road_lines(network):
-                roads.line(self.at(*first), self.at(*last), wide)
-            blend(picture, roads, colour)
-        lines, hints = self._cover(), self._cover()
-        thin = 0.5 * max(0.045 * scale, 0.8)
-        for path in centre_paths(network, 0.5 * car.road_width):
-            lines.dashed([self.at(*point) for point in path], thin, 0.2 * scale, 0.16 * scale)
-        for first, last in stop_lines(problem):
-            lines.dashes(self.at(*first), self.at(*last), 1.4 * thin, car.road_width * scale, 1.0)
-        for hint in lane_hints(network, car.w):
-            hints.path([self.at(*point) for point in hint], 0.5 * max(0.04 * scale, 0.7))
-        blend(picture, hints, palette.HINT_COLOUR, min(1.0, scale / 20.0))
-        blend(picture, lines, palette.LINE_COLOUR)
+        drawn = [*shapes.roads(network, car), *shapes.hints(network, car), *shapes.centres(network, car)]
+        self._draw(picture, [*drawn, *shapes.stops(problem)])
         return (picture + 0.5).astype(np.uint8)
 
     def _with_goals(self, lit: Sequence[int]) -> Image:
         """Return the roads with goals, those of some intersections lit, and obstacles."""
         picture = self._base.astype(np.float64)
-        points, stroke = self._problem.network.points, self._view.stroke
-        radius = self._problem.intersection_radius * self._view.scale
-        for vertex, numbers in self._numbers.items():
-            x, y = self.at(*points[vertex])
-            inner, ring = self._cover(), self._cover()
-            inner.disc(x, y, radius)
-            ring.ring(x, y, radius, *((1.5 * stroke, 0.0) if vertex in lit else (0.9 * stroke, 5.0)))
-            blend(picture, inner, palette.GOAL_COLOUR, 0.42 if vertex in lit else 0.16)
-            blend(picture, ring, palette.GOAL_COLOUR)
-            size = min(14.0, 0.5 * radius)
-            if size >= 6.0:
-                for colour, half in (("#FFFFFF", 0.09 * size + 1.3), (GOAL_INK, 0.09 * size)):
-                    words = self._cover()
-                    words.digits(numbers, x, y, size, half)
-                    blend(picture, words, colour)
-        self._obstacles(picture)
+        problem = self._problem
+        size = shapes.Width(0.5 * problem.intersection_radius, 6.0, 14.0)
+        names = shapes.goal_names(problem, size)
+        self._draw(picture, [*shapes.goals(problem, lit), *names, *shapes.obstacles(problem)])
         return (picture + 0.5).astype(np.uint8)
 
-    def _obstacles(self, picture: Floats) -> None:
+    def _draw(self, picture: Floats, drawn: Sequence[Shape]) -> None:
+        """Draw shapes; lines of one colour that follow each other cover each other as one shape."""
         scale = self._view.scale
-        for colour, wide in ((palette.INK_COLOUR, 0.6), (palette.OBSTACLE_COLOUR, -0.6)):
-            cover = self._cover()
-            for obstacle in self._problem.obstacles:
-                if isinstance(obstacle, DiscObstacle):
-                    cover.disc(*self.at(obstacle.x, obstacle.y), obstacle.radius * scale + wide)
-                else:
-                    cover.polygon([self.at(*point) for point in obstacle.vertices], wide)
-            blend(picture, cover, colour)
+        for (kind, colour, opacity), run in groupby(drawn, key=lambda shape: _look(shape, scale)):
+            if kind is Line:
+                cover = Cover(self.width, self.height)
+                for shape in run:
+                    if isinstance(shape, Line):
+                        self._line(cover, shape)
+                blend(picture, cover, colour, opacity)
+                continue
+            for shape in run:
+                for part, ink, share in self._covers(shape):
+                    blend(picture, part, ink, share)
+
+    def _line(self, cover: Cover, line: Line) -> None:
+        half, points = 0.5 * line.width.at(self._view.scale), [self.at(*point) for point in line.points]
+        if line.round:
+            cover.path(points, half)
+        else:
+            on, off = line.dash or (np.inf, 1.0)
+            on = min(on, float(np.abs(line.points[1:] - line.points[:-1]).sum()) + 1.0)
+            cover.dashed(points, half, on * self._view.scale, off * self._view.scale)
+
+    def _covers(self, shape: Shape) -> Iterator[tuple[Cover, str, float]]:
+        """Return what the parts of a shape cover, with their colours and opacities."""
+        scale, stroke = self._view.scale, self._view.stroke
+        if isinstance(shape, Circle):
+            inner, ring = self._cover(), self._cover()
+            x, y = self.at(shape.x, shape.y)
+            inner.disc(x, y, shape.radius * scale)
+            ring.ring(x, y, shape.radius * scale, 0.5 * shape.width * stroke, shape.dash)
+            yield inner, shape.fill, shape.opacity
+            yield ring, shape.edge, 1.0
+        elif isinstance(shape, Region):
+            points = [self.at(*point) for point in shape.points]
+            for colour, wide in ((shape.edge, 0.5 * shape.width), (shape.fill, -0.5 * shape.width)):
+                if colour is not None:
+                    cover = self._cover()
+                    cover.polygon(points, wide)
+                    yield cover, colour, 1.0
+        elif isinstance(shape, Text) and shape.number is not None and (size := shape.size_at(scale)) > 0.0:
+            for colour, half in (("#FFFFFF", 0.09 * size + 1.3), (shape.colour, 0.09 * size)):
+                cover = self._cover()
+                cover.digits(shape.number, *self.at(shape.x, shape.y), size, half)
+                yield cover, colour, 1.0
+
+    def _cover(self) -> Cover:
+        return Cover(self.width, self.height)
 
 
-def stop_lines(problem: Problem) -> list[tuple[Floats, Floats]]:
-    """Return the lines at which cars stop before crossings, from the middle of the road to its edge, metres."""
-    if not problem.rules:
-        return []
-    network = problem.network
-    least = RuleParameters.from_mapping(problem.rules).crossing_degree
-    found: list[tuple[Floats, Floats]] = []
-    for ends, tangent, last in zip(network.ends, network.tangents, network.end_tangents, strict=True):
-        for vertex, away in ((int(ends[0]), tangent), (int(ends[1]), -last)):
-            if network.degrees[vertex] >= least:
-                middle = network.points[vertex] + problem.intersection_radius * away
-                right = np.array([-away[1], away[0]])
-                found.append((middle, middle + 0.5 * problem.car.road_width * right))
-    return found
+def _look(shape: Shape, scale: float) -> tuple[type[Shape], str, float]:
+    """Return what tells shapes apart that are not drawn as one: their kind, and of lines colour and opacity."""
+    if isinstance(shape, Line):
+        return Line, shape.colour, shape.opacity_at(scale)
+    return type(shape), "", 1.0
+
+
+def picture_size(problem: Problem, longer: int) -> tuple[int, int]:
+    """Return width and height of a picture that all roads fill, the longer side `longer` pixels; both are even."""
+    box = _box(problem)
+    width, height = box.width + 2.0 * MARGIN, box.height + 2.0 * MARGIN
+    sides = (max(SIZES[0], 2 * round(0.5 * longer * side / max(width, height))) for side in (width, height))
+    across, down = sides
+    return across, down
+
+
+def _box(problem: Problem) -> Extent:
+    """Return the box of all roads, goals and obstacles of a problem."""
+    reach = problem.intersection_radius
+    goals = problem.network.points[list(problem.goal_vertices)].reshape(-1, 2)
+    fixed = [goals - reach, goals + reach, *(obstacle_points(one) for one in problem.obstacles)]
+    return extent(problem.network, 0.5 * problem.car.road_width, *fixed)
 
 
 def _view(problem: Problem, width: int, height: int, chosen: int) -> View:
     """Return how all roads, goals and obstacles of a problem just fit into a picture."""
-    network, reach, body = problem.network, problem.intersection_radius, problem.car.body
-    goals = network.points[list(problem.goal_vertices)].reshape(-1, 2)
-    fixed = [goals - reach, goals + reach, *(obstacle_points(one) for one in problem.obstacles)]
-    box = extent(network, 0.5 * problem.car.road_width, *fixed)
+    body, box = problem.car.body, _box(problem)
     scale = min(width / (box.width + 2.0 * MARGIN), height / (box.height + 2.0 * MARGIN))
     side = float(min(width, height))
     grow = max(1.0, min(5.0, 0.0125 * side) / (body.reach * scale))

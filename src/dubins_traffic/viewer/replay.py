@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import base64
+import json
 import math
 import os
 from collections.abc import Mapping, Sequence
@@ -33,6 +34,7 @@ from dubins_traffic.viewer.marks import (
 )
 from dubins_traffic.viewer.pages import PAGES, part, render
 from dubins_traffic.viewer.scene import centre_lines, lane_hints, road_lines
+from dubins_traffic.viewer.shapes import CENTRE, DASH, HINT, KERB, KERB_PIXELS
 
 SCRIPTS = (
     "replay_marks.js",
@@ -44,6 +46,13 @@ SCRIPTS = (
 )
 HEADING_STEPS = 32767
 UNITS = ("s", "m")
+LOOKS = {
+    "kerb": [KERB, KERB_PIXELS],
+    "centre": [CENTRE.metres, CENTRE.least],
+    "hint": [HINT.metres, HINT.least],
+    "dash": [*DASH],
+}
+"""Widths of lines of the map, metres and at least so many pixels, and the strokes and gaps of centre lines, metres."""
 
 
 def write_replay(
@@ -100,8 +109,9 @@ def replay_page(
     if len(frames) == 0:
         raise InputError("nothing to replay", field="frames", value=0, expected="at least one frame")
     title = f"Trial {instance.trial} of seed {instance.seed}"
-    style = part("viewer/replay.css")
-    script = "\n".join(["(() => {", '"use strict";', *(part(f"viewer/{name}") for name in SCRIPTS), "})();"])
+    style = palette.style_sheet() + part("viewer/replay.css")
+    scripts = [f"const LOOKS = {json.dumps(LOOKS)};", *(part(f"viewer/{name}") for name in SCRIPTS)]
+    script = "\n".join(["(() => {", '"use strict";', *scripts, "})();"])
     breaches = [] if verdict is None else breach_marks(instance, verdict.violations)
     every = marks_of(instance, frames, [*marks, *breaches])
     document = _document(title, instance, frames, ending, summary or {}, every)

@@ -152,23 +152,25 @@ class MapView {
 
   drawRoads(lanes) {
     const { context: c, trial, colours, pixel } = this;
+    const wide = ([metres, pixels]) => Math.max(metres, pixels * pixel);
+    const { kerb, centre, hint, dash } = LOOKS;
     c.lineCap = c.lineJoin = "round";
     c.strokeStyle = colours.kerb;
-    c.lineWidth = trial.width + 2 * Math.max(0.03, 0.8 * pixel);
+    c.lineWidth = trial.width + 2 * wide(kerb);
     c.stroke(this.roads);
     c.strokeStyle = colours.road;
     c.lineWidth = trial.width;
     c.stroke(this.roads);
     c.lineCap = "butt";
     c.strokeStyle = colours.line;
-    c.lineWidth = Math.max(0.045, 0.8 * pixel);
-    c.setLineDash([0.2, 0.16]);
+    c.lineWidth = wide(centre);
+    c.setLineDash(dash);
     c.stroke(this.centres);
     c.setLineDash([]);
     if (!lanes) return;
     c.lineCap = "round";
     c.strokeStyle = colours.hint;
-    c.lineWidth = Math.max(0.04, 0.7 * pixel);
+    c.lineWidth = wide(hint);
     c.stroke(this.hints);
   }
 

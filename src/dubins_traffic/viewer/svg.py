@@ -8,20 +8,23 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from dubins_traffic.cars.body import Car, DiscObstacle, Obstacle
+from dubins_traffic.cars.body import Car
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.bodies import outline
-from dubins_traffic.viewer.marks import Mark, goal_numbers
-from dubins_traffic.viewer.scene import Extent, centre_paths, extent, obstacle_points, road_lines
+from dubins_traffic.viewer import palette, shapes
+from dubins_traffic.viewer.marks import Mark
+from dubins_traffic.viewer.scene import Extent, extent, obstacle_points
+from dubins_traffic.viewer.shapes import Circle, Line, Region, Shape, Sign, Text, Width
 
 WIDTH, HEIGHT = 460.0, 400.0
 """Most pixels of a picture."""
 MARGIN = 0.3
 """Metres around the roads."""
+SIGN = 5.0
+"""Half the size of a mark, pixels."""
+LETTERS = Width(0.0, 11.0, 11.0)
 NAMED = 12
 """Most cars that bear their names."""
 VERDICT_COLOURS: Mapping[str, str] = {
@@ -46,19 +49,15 @@ class Drawing:
     """
 
     def __init__(self, network: RoadNetwork, car: Car, spans: Sequence[Floats] = ()) -> None:
-        self.network, self.car = network, car
         box = extent(network, 0.5 * car.road_width, *spans)
         self.box = Extent(box.left - MARGIN, box.bottom - MARGIN, box.right + MARGIN, box.top + MARGIN)
         self.scale = min(WIDTH / self.box.width, HEIGHT / self.box.height, 60.0)
         self.parts: list[str] = []
-        self.names: list[tuple[str, float, float]] = []
-        self._roads()
+        self.draw([*shapes.roads(network, car), *shapes.centres(network, car)])
 
     def svg(self, title: str) -> str:
         """Return the picture; `title` is what is read aloud."""
         width, height = self.box.width * self.scale, self.box.height * self.scale
-        for name, x, y in self.names:
-            self.text(name, x, y, "#00684B")
         return (
             f'<svg xmlns="http://www.w3.org/2000/svg" role="img" width="{width:.0f}" height="{height:.0f}" '
             f'viewBox="0 0 {width:.1f} {height:.1f}" style="max-width:100%;height:auto">'
@@ -66,101 +65,79 @@ class Drawing:
             f'<rect width="100%" height="100%" fill="{palette.GROUND_COLOUR}"/>{"".join(self.parts)}</svg>'
         )
 
-    def at(self, x: float, y: float) -> tuple[float, float]:
+    def draw(self, drawn: Iterable[Shape]) -> None:
+        """Draw shapes."""
+        self.parts += [self._element(shape) for shape in drawn]
+
+    def _at(self, x: float, y: float) -> tuple[float, float]:
         """Return a point of the world in pixels."""
         return (x - self.box.left) * self.scale, (self.box.top - y) * self.scale
 
-    def points(self, points: Iterable[Sequence[float]]) -> str:
+    def _points(self, points: Iterable[Sequence[float]]) -> str:
         """Return points of the world as the attribute of a line."""
-        return " ".join("{:.1f},{:.1f}".format(*self.at(float(x), float(y))) for x, y in points)
+        return " ".join("{:.1f},{:.1f}".format(*self._at(float(x), float(y))) for x, y in points)
 
-    def line(self, points: Iterable[Sequence[float]], colour: str, width: float, more: str = "") -> None:
-        """Draw a line of `width` pixels."""
-        self.parts.append(
-            f'<polyline points="{self.points(points)}" fill="none" stroke="{colour}" stroke-width="{width:.1f}" '
-            f'stroke-linejoin="round" {more}/>'
+    def _element(self, shape: Shape) -> str:
+        """Return the element of a shape."""
+        if isinstance(shape, Line):
+            more = ' stroke-linecap="round"' if shape.round else ""
+            if shape.dash is not None:
+                more += ' stroke-dasharray="{:.1f} {:.1f}"'.format(
+                    *(self.scale * part for part in shape.dash)
+                )
+            if (opacity := shape.opacity_at(self.scale)) < 1.0:
+                more += f' stroke-opacity="{opacity:.2g}"'
+            return (
+                f'<polyline points="{self._points(shape.points)}" fill="none" stroke="{shape.colour}" '
+                f'stroke-width="{shape.width.at(self.scale):.1f}" stroke-linejoin="round"{more}/>'
+            )
+        if isinstance(shape, Region):
+            edge = "" if shape.edge is None else f' stroke="{shape.edge}" stroke-width="{shape.width:.1f}"'
+            return f'<polygon points="{self._points(shape.points)}" fill="{shape.fill}"{edge}/>'
+        x, y = self._at(shape.x, shape.y)
+        if isinstance(shape, Circle):
+            return (
+                f'<circle cx="{x:.1f}" cy="{y:.1f}" r="{shape.radius * self.scale:.1f}" fill="{shape.fill}" '
+                f'fill-opacity="{shape.opacity:g}" stroke="{shape.edge}" stroke-width="{shape.width:g}"/>'
+            )
+        if isinstance(shape, Sign):
+            return self._sign(shape, x, y)
+        return (
+            f'<text x="{x:.1f}" y="{y:.1f}" fill="{shape.colour}" font-size="{shape.size.at(self.scale):g}" '
+            'text-anchor="middle" dominant-baseline="middle" font-family="sans-serif" paint-order="stroke" '
+            f'stroke="#ffffff" stroke-width="2.5" stroke-opacity="0.8">{html.escape(shape.words)}</text>'
         )
 
-    def shape(self, points: Iterable[Sequence[float]], fill: str, edge: str, width: float = 1.0) -> None:
-        """Draw a closed shape."""
-        self.parts.append(
-            f'<polygon points="{self.points(points)}" fill="{fill}" stroke="{edge}" stroke-width="{width:.1f}"/>'
-        )
-
-    def circle(self, x: float, y: float, radius: float, fill: str, edge: str, more: str = "") -> None:
-        """Draw a circle of `radius` metres."""
-        px, py = self.at(x, y)
-        self.parts.append(
-            f'<circle cx="{px:.1f}" cy="{py:.1f}" r="{radius * self.scale:.1f}" fill="{fill}" stroke="{edge}" {more}/>'
-        )
-
-    def text(
-        self, words: str, x: float, y: float, colour: str, lift: float = 0.0, size: float = 11.0
-    ) -> None:
-        """Write words about a point, `lift` pixels above it."""
-        px, py = self.at(x, y)
-        self.parts.append(
-            f'<text x="{px:.1f}" y="{py - lift:.1f}" fill="{colour}" font-size="{size:g}" text-anchor="middle" '
-            'dominant-baseline="middle" font-family="sans-serif" paint-order="stroke" stroke="#ffffff" '
-            f'stroke-width="2.5" stroke-opacity="0.8">{html.escape(words)}</text>'
-        )
-
-    def _roads(self) -> None:
-        lines = road_lines(self.network)
-        width = self.car.road_width * self.scale
-        for colour, wide in ((palette.KERB_COLOUR, width + 2.0), (palette.ROAD_COLOUR, width)):
-            for ends in lines:
-                self.line(ends, colour, wide, 'stroke-linecap="round"')
-        for path in centre_paths(self.network, 0.5 * self.car.road_width):
-            self.line(path, palette.LINE_COLOUR, 1.0, 'stroke-dasharray="4 3"')
+    def _sign(self, sign: Sign, x: float, y: float) -> str:
+        size = SIGN
+        if sign.kind == "contact":
+            ends = (
+                f"M{x - size:.1f} {y - size:.1f}l{2 * size} {2 * size}m0 -{2 * size}l-{2 * size} {2 * size}"
+            )
+            return f'<path d="{ends}" fill="none" stroke="{sign.fill}" stroke-width="2.2"/>'
+        corners = [(x, y - size), (x + 0.9 * size, y + 0.6 * size), (x - 0.9 * size, y + 0.6 * size)]
+        points = " ".join(f"{px:.1f},{py:.1f}" for px, py in corners)
+        return f'<polygon points="{points}" fill="{sign.fill}" stroke="{sign.edge}" stroke-width="1.6"/>'
 
     def problem(self, problem: Problem) -> None:
-        """Draw the goals with their numbers, and the obstacles."""
-        for vertex, numbers in goal_numbers(problem).items():
-            x, y = self.network.points[vertex].tolist()
-            more = 'fill-opacity="0.22" stroke-width="1.4"'
-            self.circle(x, y, problem.intersection_radius, palette.GOAL_COLOUR, palette.GOAL_COLOUR, more)
-            self.names.append((f"goal {numbers}", x, y))
-        for obstacle in problem.obstacles:
-            self._obstacle(obstacle)
+        """Draw the goals and the obstacles."""
+        self.draw([*shapes.goals(problem), *shapes.obstacles(problem)])
 
-    def _obstacle(self, obstacle: Obstacle) -> None:
-        fill, edge = palette.OBSTACLE_COLOUR, palette.INK_COLOUR
-        if isinstance(obstacle, DiscObstacle):
-            self.circle(obstacle.x, obstacle.y, obstacle.radius, fill, edge)
-        else:
-            self.shape(obstacle.vertices, fill, edge)
+    def names(self, problem: Problem) -> None:
+        """Write the names of the goals."""
+        self.draw(shapes.goal_names(problem, LETTERS))
 
     def cars(self, instance: Instance, poses: Sequence[Pose]) -> None:
-        """Draw the cars with a stroke ahead, and their names if they are few; the ego comes last, on top."""
-        body = self.car.body
-        for index, (name, pose) in reversed(list(enumerate(zip(instance.names, poses, strict=True)))):
-            self.shape(outline(body, pose, corners=24), palette.car_colour(index), palette.INK_COLOUR)
-            ahead = (pose.x + body.reach * pose.c, pose.y + body.reach * pose.s)
-            self.line([(pose.x, pose.y), ahead], "#ffffff", 1.5)
-            if len(poses) <= NAMED:
-                self.text(name, pose.x, pose.y, palette.INK_COLOUR, lift=body.reach * self.scale + 8.0)
-
-    def paths(self, paths: Sequence[Floats]) -> None:
-        """Draw the way of each car, (P, 2) metres, in its colour."""
-        for index, path in reversed(list(enumerate(paths))):
-            self.line(path, palette.car_colour(index), 2.4 if index == 0 else 1.6, 'stroke-opacity="0.9"')
-
-    def marks(self, marks: Sequence[Mark]) -> None:
-        """Draw contacts as crosses and breaches as triangles, filled if they are the ego's."""
-        for mark in marks:
-            if mark.point is None:
-                continue
-            x, y = mark.point
-            size = 5.0 / self.scale
-            if mark.kind == "contact":
-                for way in (1.0, -1.0):
-                    ends = [(x - size, y - way * size), (x + size, y + way * size)]
-                    self.line(ends, palette.CONTACT_COLOUR, 2.2)
-            elif mark.kind == "breach":
-                colour = palette.BREACH_COLOURS[mark.car != 0]
-                corners = [(x, y + size), (x + 0.9 * size, y - 0.6 * size), (x - 0.9 * size, y - 0.6 * size)]
-                self.shape(corners, colour if mark.car == 0 else "#ffffff", colour, 1.6)
+        """Draw the cars, and their names above them if they are few."""
+        body = instance.problem.car.body
+        self.draw(shapes.cars(body, instance.names, poses))
+        if len(poses) <= NAMED:
+            lift = body.reach + 8.0 / self.scale
+            ink = palette.INK_COLOUR
+            self.draw(
+                Text(pose.x, pose.y + lift, name, ink, LETTERS)
+                for name, pose in reversed(list(zip(instance.names, poses, strict=True)))
+            )
 
 
 def network_picture(network: RoadNetwork) -> str:
@@ -172,6 +149,7 @@ def problem_picture(problem: Problem) -> str:
     """Return the picture of a problem: network, goals and obstacles."""
     drawing = Drawing(problem.network, problem.car, _fixed(problem))
     drawing.problem(problem)
+    drawing.names(problem)
     return drawing.svg(f"Problem, {problem.summary}")
 
 
@@ -199,9 +177,10 @@ def trial_picture(
     spans = [*_fixed(problem), np.array([[pose.x, pose.y] for pose in poses]).reshape(-1, 2), *paths]
     drawing = Drawing(problem.network, problem.car, spans)
     drawing.problem(problem)
-    drawing.paths(paths)
+    drawing.draw(shapes.ways(paths))
     drawing.cars(instance, poses)
-    drawing.marks(marks)
+    drawing.draw(shapes.signs(marks))
+    drawing.names(problem)
     return drawing.svg(f"{instance.title}, {problem.summary}")
 
 
