@@ -15,7 +15,7 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.falsification import search
 from dubins_traffic.falsification.archive import files
 from dubins_traffic.falsification.case import Case, read_case
-from dubins_traffic.falsification.companies import Driven
+from dubins_traffic.falsification.companies import Watched
 from dubins_traffic.falsification.estimate import by_counting, by_splitting, drawn
 from dubins_traffic.falsification.judging import confirm, judge
 from dubins_traffic.falsification.shrink import single_removals
@@ -192,7 +192,7 @@ def test_a_particle_that_branches_off_is_a_fork_bit_for_bit() -> None:
     begin = standing()
     whole = begin(instances)
     whole.advance(90)
-    twin = Driven(whole.group.fork(range(4), [7, 8, 9, 10]), whole.rule)
+    twin = Watched(whole.group.fork(range(4), [7, 8, 9, 10]), whole.rule)
     whole.reseed([7, 8, 9, 10])
     for own in (whole, twin):
         own.advance(instances[0].ticks - 90)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -10,8 +9,8 @@ from typing import TYPE_CHECKING
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.chunks import Chunk
 from dubins_traffic.campaign.folder import Keep, Records
-from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch import run_together
+from dubins_traffic.engine.egos import Egos
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.outside import put_back
 from dubins_traffic.problem.draw import draw_many
@@ -74,14 +73,14 @@ def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Cancelled
     """
     if records is not None:
         records.check()
-    with contextlib.suppress(controllers.ConstructionError):  # counts as a fault of each trial
-        controllers.load(chunk.controller)
+    egos = Egos(chunk.controller)
+    _ = egos.shared  # that there is no such controller is told here
     makers = scores.makers(chunk.metrics)
     chunk = replace(chunk, configuration=_known(chunk.configuration))
     found: dict[int, rows.Row] = {}
     together = [k for k in range(chunk.count) if not _is_alone(chunk, k, records)]
     for first in range(0, len(together), TOGETHER):
-        found |= _together(chunk, together[first : first + TOGETHER], cancelled, makers)
+        found |= _together(chunk, egos, together[first : first + TOGETHER], cancelled, makers)
     for k in range(chunk.count):
         if k not in found or (records is not None and _is_recorded(records, chunk.number + k, found[k])):
             found[k] = _row(chunk, k, records, cancelled)
@@ -107,7 +106,7 @@ def _is_recorded(records: Records, number: int, row: rows.Row) -> bool:
 
 
 def _together(
-    chunk: Chunk, some: Sequence[int], cancelled: Cancelled, metrics: Sequence[Maker]
+    chunk: Chunk, egos: Egos, some: Sequence[int], cancelled: Cancelled, metrics: Sequence[Maker]
 ) -> dict[int, rows.Row]:
     """Run trials of a chunk together; return the rows of those that fit a batch.
 
@@ -116,7 +115,7 @@ def _together(
     found: dict[int, rows.Row] = {}
     try:
         instances = list(draw_many(chunk.configuration, chunk.seed, [chunk.trial + k for k in some]))
-        for outcome in run_together(instances, chunk.controller, cancelled, metrics):
+        for outcome in run_together(instances, egos, cancelled, metrics):
             k = outcome.instance.trial - chunk.trial
             found[k] = rows.row(chunk.number + k, outcome.ending, outcome.score, outcome.act_s)
     except (Exception, SystemExit):  # the trial at fault is found when each is run by itself

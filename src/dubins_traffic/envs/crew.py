@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,9 +11,7 @@ import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.controllers import registry
-from dubins_traffic.controllers.registry import COMPILED
-from dubins_traffic.engine.controlled import Controlled
+from dubins_traffic.engine.egos import Egos, Way
 from dubins_traffic.engine.group import Group
 from dubins_traffic.envs.about_ego import NAMES, count_cars, tell_cars
 from dubins_traffic.envs.bank import Board
@@ -98,9 +95,12 @@ class Crew:
 
     def __init__(self, instances: Sequence[Instance], cast: Cast, settings: Settings) -> None:
         own = [with_learners(instance, cast.learned) for instance in instances]
-        controlled = cast.ego is not None and (cast.ego != COMPILED or settings.disturbed)
-        self._egos = Controlled(own, partial(registry.load, str(cast.ego))) if controlled else None
-        self.group = self._egos.group if self._egos else Group(own, keeps_rules=cast.ego == COMPILED)
+        if cast.ego is None:
+            self.group = Group(own, keeps_rules=False)
+        else:
+            egos = Egos(cast.ego, apart=True)
+            is_kernel = egos.is_compiled and not settings.disturbed
+            self.group = egos.group(own, Way.COMPILED if is_kernel else Way.ASKED)
         self._cars = len(instances[0].starts)
         trials, places = self.group.state.x.shape
         problems = [instance.problem for instance in instances]
@@ -158,8 +158,7 @@ class Crew:
     def _tick(self, asked: Floats) -> None:
         group, commands = self.group, self.group.commands
         commands[:, self._learned] = asked[:, self._learned]
-        if self._egos is not None:
-            self._egos.ask_each()
+        group.decide()
         running = group.active
         for shields in self._shields:
             ticks: Ints = np.full(len(group.instances), -1)

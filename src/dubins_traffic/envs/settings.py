@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from dubins_traffic.cars.dynamics import require_dubins
-from dubins_traffic.engine.sharing import can_share, undisturbed
+from dubins_traffic.engine.egos import can_share, undisturbed
 from dubins_traffic.envs.actions import ActionMap
 from dubins_traffic.envs.episodes import Episodes, Levels
 from dubins_traffic.envs.formulas import with_formulas

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dubins_traffic.controllers.registry import COMPILED
-from dubins_traffic.engine.controlled import Controlled, Maker, grouped
-from dubins_traffic.engine.fork import reseed
+from dubins_traffic.engine.controlled import Maker
+from dubins_traffic.engine.egos import Egos, Way, can_share, grouped
 from dubins_traffic.engine.group import Group
-from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
 from dubins_traffic.errors import ControllerError, InputError
 from dubins_traffic.falsification.splitting import Begin
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.record.sink import FAULTS
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -59,6 +58,27 @@ class Watched:
         margins = self.margins()
         return margins if self.rule != "1.collision" else np.minimum(margins, coming(self.group))
 
+    def advance(self, ticks: int) -> None:
+        """Take all trials some ticks farther.
+
+        Raises
+        ------
+        ControllerError
+            If one of them ends by a fault: then there is no estimate.
+        """
+        self.group.drive(ticks)
+        for instance, ending in zip(self.group.instances, self.group.endings, strict=True):
+            if ending is not None and ending.end in FAULTS:
+                raise ControllerError(ending.end.value, f"{instance.title} ended by a fault ({ending})")
+
+    def fork(self, trials: Sequence[int]) -> Watched:
+        """Return independent copies of some trials, each with a copy of its controller."""
+        return Watched(self.group.fork(trials), self.rule)
+
+    def reseed(self, seeds: Sequence[int]) -> None:
+        """Let each trial go on from another seed."""
+        self.group = self.group.reseeded(seeds)
+
 
 def coming(group: Group) -> Floats:
     """Return the clearance to come of each trial's ego, (B,): infinite where it is alone.
@@ -80,56 +100,8 @@ def coming(group: Group) -> Floats:
     return least
 
 
-class Driven(Watched):
-    """Trials that are run by the group itself: its egos keep the rules, or are told nothing and stand."""
-
-    def advance(self, ticks: int) -> None:
-        """Take all trials some ticks farther."""
-        self.group.advance(ticks)
-
-    def fork(self, trials: Sequence[int]) -> Driven:
-        """Return independent copies of some trials."""
-        return Driven(self.group.fork(trials), self.rule)
-
-    def reseed(self, seeds: Sequence[int]) -> None:
-        """Let each trial go on from another seed; what names them still has their first one."""
-        reseed(self.group.world, np.array(seeds, dtype=np.uint64))
-
-
-class Steered(Watched):
-    """Trials whose controllers are asked in every tick."""
-
-    def __init__(self, seats: Controlled, rule: str, name: str) -> None:
-        super().__init__(seats.group, rule)
-        self._seats, self._name = seats, name
-
-    def advance(self, ticks: int) -> None:
-        """Take all trials some ticks farther.
-
-        Raises
-        ------
-        ControllerError
-            If one of them ends by a fault: then there is no estimate.
-        """
-        for _ in range(ticks):
-            self._seats.ask_each()
-            for outcome in self._seats.step(self._name):
-                if outcome.ending.ticks < outcome.instance.ticks:
-                    told = f"{outcome.instance.title} ended by a fault ({outcome.ending})"
-                    raise ControllerError(outcome.ending.end.value, told)
-
-    def fork(self, trials: Sequence[int]) -> Steered:
-        """Return independent copies of some trials, each with a copy of its controller."""
-        return Steered(self._seats.fork(trials), self.rule, self._name)
-
-    def reseed(self, seeds: Sequence[int]) -> None:
-        """Let each trial go on from another seed."""
-        self._seats = self._seats.fork(range(len(seeds)), seeds)
-        self.group = self._seats.group
-
-
-def beginner(make: Maker, name: str, rule: str) -> Begin:
-    """Return what begins trials of instances whose egos are driven by controllers that `make` makes.
+def beginner(controller: str | Maker, rule: str) -> Begin:
+    """Return what begins trials of instances whose egos a controller drives.
 
     Raises
     ------
@@ -139,21 +111,16 @@ def beginner(make: Maker, name: str, rule: str) -> Begin:
     if rule not in MEASURED:
         expected = f"one of {', '.join(MEASURED)}"
         raise InputError("has no margin that can be watched", file="--event", value=rule, expected=expected)
+    egos = Egos(controller, apart=True)
 
-    def begin(instances: Sequence[Instance]) -> Driven | Steered:
-        check_alike(instances)
-        fit = fitness()
-        if name == COMPILED and all(fit(own) and undisturbed(own) for own in instances):
-            return Driven(Group(instances, keeps_rules=True), rule)
-        return Steered(Controlled(instances, make), rule, name)
+    def begin(instances: Sequence[Instance]) -> Watched:
+        ways = egos.ways(instances)
+        if not all(map(can_share, instances)) or len(grouped(instances)) != 1:
+            raise InputError(
+                "trials that can't be stepped together", field="e-agents", value=instances[0].problem.e_agents,
+                expected="the embedded simulator, no formulas, no cars of one's own or elsewhere, one control rate",
+            )  # fmt: skip
+        way = Way.COMPILED if len(ways[Way.COMPILED]) == len(instances) else Way.ASKED
+        return Watched(egos.group(instances, way), rule)
 
     return begin
-
-
-def check_alike(instances: Sequence[Instance]) -> None:
-    """Refuse instances that can't be stepped together."""
-    if not all(can_share(own) for own in instances) or len(grouped(instances)) != 1:
-        raise InputError(
-            "trials that can't be stepped together", field="e-agents", value=instances[0].problem.e_agents,
-            expected="the embedded simulator, no formulas, no cars of one's own or elsewhere, one control rate",
-        )  # fmt: skip

@@ -12,7 +12,7 @@ from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError, WorkerLostError
 from dubins_traffic.falsification.remote import Remote
-from dubins_traffic.falsification.trying import Laboratory, Tried, in_order
+from dubins_traffic.falsification.trying import TrialRunner, Tried, in_order
 from dubins_traffic.runs.crew import Cancelled, carry_out
 from dubins_traffic.runs.crew import Crew as Workers
 from dubins_traffic.runs.ray_crew import check_address, crew_at
@@ -52,11 +52,11 @@ class Here:
     def __init__(self, controller: str | Maker | Remote, name: str) -> None:
         self.make = driver_of(controller)
         self.name = name
-        self._laboratory = Laboratory(controller)
+        self._runner = TrialRunner(controller)
 
     def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
         """Run the trials of instances, and yield what came of some as soon as they have ended."""
-        return self._laboratory.attempt(instances)
+        return self._runner.attempt(instances)
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,14 +70,14 @@ class Lot:
 
     def run(self, cancelled: Cancelled) -> tuple[list[Tried], float | None]:
         """Run the trials; return what came of them, and how long their controller takes for an answer."""
-        if self.controller not in _laboratories:
-            _laboratories[self.controller] = Laboratory(self.controller)
-        laboratory = _laboratories[self.controller]
-        laboratory.cancelled = cancelled
-        return in_order(laboratory.attempt(self.instances)), laboratory.answer_s
+        if self.controller not in _runners:
+            _runners[self.controller] = TrialRunner(self.controller)
+        runner = _runners[self.controller]
+        runner.cancelled = cancelled
+        return in_order(runner.attempt(self.instances)), runner.answer_s
 
 
-_laboratories: dict[str, Laboratory] = {}
+_runners: dict[str, TrialRunner] = {}
 
 
 class Elsewhere:

@@ -23,7 +23,7 @@ from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.companies import beginner
 from dubins_traffic.falsification.coverage import Counts
-from dubins_traffic.falsification.crew import Crew, crew_of, maker
+from dubins_traffic.falsification.crew import Crew, crew_of
 from dubins_traffic.falsification.liveness import TARGETS
 from dubins_traffic.falsification.sampling import STREAM, prepared
 from dubins_traffic.falsification.splitting import Begin, Split, split
@@ -268,7 +268,7 @@ def estimate(
     name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
     told = progress or _silent
     if method == "splitting":
-        begin = beginner(maker(controller), name, event)
+        begin = beginner(controller, event)
         return by_splitting(drawn(own, seed), begin, event, below, particles, runs, seed, told)
     count = trials or 10_000
     with crew_of(controller, name, workers, None) as crew:

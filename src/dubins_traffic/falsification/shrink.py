@@ -14,7 +14,7 @@ from dubins_traffic.falsification.crew import driver_of
 from dubins_traffic.falsification.judging import Judged, Make, confirm, judge, sentence_of
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.removals import WAYS, Removal, Way, lead, removals
-from dubins_traffic.falsification.trying import Laboratory, in_order
+from dubins_traffic.falsification.trying import TrialRunner, in_order
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 
 if TYPE_CHECKING:
@@ -93,7 +93,7 @@ class _Shrinker:
     """Takes things away while the ego goes on breaking `rule`."""
 
     def __init__(self, driver: str | Maker | Remote, make: Make, name: str, rule: str) -> None:
-        self._laboratory = Laboratory(driver)
+        self._runner = TrialRunner(driver)
         self._make, self._name, self._rule = make, name, rule
 
     def shrunk(self, found: Judged, progress: Progress | None) -> Judged:
@@ -115,7 +115,7 @@ class _Shrinker:
         tried = [(what, own) for what, own in way(record.instance, record.frames) if _is_sound(own)]
         if not tried:
             return None
-        findings = in_order(self._laboratory.attempt([own for _, own in tried]))
+        findings = in_order(self._runner.attempt([own for _, own in tried]))
         for (what, own), came in zip(tried, findings, strict=True):
             if any(cell.rule == self._rule for cell, _ in came.cells):
                 again = confirm(own, self._rule, self._make, self._name)

@@ -11,12 +11,8 @@ import numpy as np
 from dubins_traffic.campaign.chunks import fitting
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.controllers import named
-from dubins_traffic.controllers import registry as controllers
-from dubins_traffic.controllers.registry import COMPILED
-from dubins_traffic.engine.controlled import BatchController, Controlled, Maker, ask_all, check_clear, grouped
-from dubins_traffic.engine.group import Group
-from dubins_traffic.engine.lanes_together import LanesTogether
-from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
+from dubins_traffic.engine.controlled import Maker
+from dubins_traffic.engine.egos import Egos, Way, grouped
 from dubins_traffic.falsification.contract import Kept, kept
 from dubins_traffic.falsification.coverage import Cell, Manoeuvre
 from dubins_traffic.falsification.liveness import spare
@@ -25,11 +21,9 @@ from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.record.reader import Record, replay
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.margins import LIVENESS
 from dubins_traffic.scoring.score import Score, score
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Ruling
-from dubins_traffic.shield.tables import Overtakes, check_overtakes
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -100,7 +94,7 @@ class Tried:
         return Tried(**own)
 
 
-class Laboratory:
+class TrialRunner:
     """Runs the trials of a search.
 
     Parameters
@@ -122,19 +116,15 @@ class Laboratory:
     """
 
     def __init__(self, controller: str | Maker | Remote, cancelled: Cancelled = lambda: False) -> None:
-        self._name = controller if isinstance(controller, str) else "controller"
         self.cancelled = cancelled
         self.answer_s: float | None = None
-        self._number, self._fit = 0, fitness()
+        self._number = 0
         self._remote = controller if isinstance(controller, Remote) else None
-        self._overtakes: Overtakes | None
-        self._lanes, self._overtakes = lanes_of(self._name)
         if isinstance(controller, Remote):
             return
-        self._make = (lambda: controllers.load(controller)) if isinstance(controller, str) else controller
-        made = controllers.made(self._make)
-        self._shared = made if isinstance(made, BatchController) else None
-        self._most = BOXES if named.SANDBOX.search(self._name) else MOST
+        self._egos = Egos(controller, uncounted=True)
+        self._is_shared = self._egos.shared is not None
+        self._most = BOXES if named.SANDBOX.search(self._egos.name) else MOST
 
     def attempt(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
         """Run the trials of instances; yield what came of some, by their places in `instances`, as they end.
@@ -148,28 +138,24 @@ class Laboratory:
             When it is cancelled.
         """
         places = {id(own): k for k, own in enumerate(instances)}
-        together = [own for own in instances if self._remote is None and can_share(own)]
-        known = self._name == COMPILED or self._lanes
-        compiled = [own for own in together if known and self._fit(own) and undisturbed(own)]
-        fast = set(map(id, compiled))
-        for own in grouped(compiled):
-            yield self._taken(self._finished(own), places)
-        for own in grouped([own for own in together if id(own) not in fast]):
+        ways = {Way.ALONE: list(instances)} if self._remote is not None else self._egos.ways(instances)
+        for own in grouped(ways.get(Way.COMPILED, ())):
+            self.answer_s = 0.0
+            yield self._together(own, Way.COMPILED, places)
+        for own in grouped(ways.get(Way.ASKED, ())):
             first = 0
             while first < len(own):
                 some = own[first : first + self._count(own[first:])]
-                yield self._taken(self._steered(some), places)
+                yield self._together(some, Way.ASKED, places)
                 first += len(some)
-        shared = set(map(id, together))
-        for own in instances:
-            if id(own) not in shared:
-                self._check()
-                yield {places[id(own)]: self._alone(own)}
+        for own in ways[Way.ALONE]:
+            self._check()
+            yield {places[id(own)]: self._alone(own)}
 
     def _count(self, instances: Sequence[Instance]) -> int:
         """Return how many of some trials whose controllers are asked in every tick run together."""
         most = min(self._most, len(instances))
-        if self._shared is not None:
+        if self._is_shared:
             return most
         return fitting(self.answer_s, max(own.ticks for own in instances), most)
 
@@ -186,43 +172,18 @@ class Laboratory:
         if self.cancelled():
             raise KeyboardInterrupt
 
-    def _finished(self, instances: Sequence[Instance]) -> Group:
-        """Return trials that have been run without asking anybody for commands in Python."""
-        self.answer_s = 0.0
-        if not self._lanes:
-            group = Group(instances, keeps_rules=True)
-            group.finish(self.cancelled)
-        else:
-            own = LanesTogether(instances, self._overtakes)
-            group = own.group
-            while len(group.active) and not self.cancelled():
-                own.step()
-        self._check()
-        return group
-
-    def _steered(self, instances: Sequence[Instance]) -> Group:
-        """Return trials that have been run, whose controllers were asked in every tick."""
-        shared = self._shared
-        if shared is not None:
-            check_clear(instances)
+    def _together(
+        self, instances: Sequence[Instance], way: Way, places: Mapping[int, int]
+    ) -> dict[int, Tried]:
+        """Run trials that are stepped together; return what came of them, by the places of their instances."""
         numbers = range(self._number, self._number + len(instances))
         self._number = numbers.stop
-        seats = Controlled(instances, self._make, shared, numbers=numbers)
-        latencies: list[Mapping[str, float]] = []
-        while len(seats.group.active):
-            self._check()
-            if shared is None:
-                seats.ask_each()
-            else:
-                ask_all([seats], shared)
-            latencies += [outcome.act_s for outcome in seats.step(self._name)]
-        self._note(latencies)
-        return seats.group
-
-    def _taken(self, group: Group, places: Mapping[int, int]) -> dict[int, Tried]:
-        """Return what came of a group whose trials have all ended, by the places of their instances."""
+        group = self._egos.group(instances, way, numbers=numbers)
+        group.finish(self.cancelled)
+        self._check()
         ego = group.world.tally.ego
-        outcomes = group.outcomes(range(len(group.instances)), self._name)
+        outcomes = group.fresh(self._egos.name)
+        self._note(outcome.act_s for outcome in outcomes)
         frames = np.array([outcome.ending.ticks + 1 for outcome in outcomes])
         networks = [own.problem.network for own in group.instances]
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
@@ -237,8 +198,7 @@ class Laboratory:
             found, passages = judged_record(record)
             return _tried_alone(instance, found, record.ending, passages)
         ego = EgoTrace()
-        driver = controllers.made(self._make)
-        result = run_trial(instance, driver, sinks=[ego], name=self._name, sketch=False)
+        result = self._egos.alone(instance, sinks=[ego])
         self._note([result.wall.act_s])
         return _tried_alone(instance, result.score, result.ending, ego.passages())
 
@@ -329,12 +289,6 @@ def in_order(parts: Iterable[Mapping[int, Tried]]) -> list[Tried]:
     """Return what came of trials in the order of their instances, of which `parts` have some each."""
     found = {k: own for part in parts for k, own in part.items()}
     return [found[k] for k in range(len(found))]
-
-
-def lanes_of(name: str) -> tuple[bool, Overtakes | None]:
-    """Tell whether a name is that of `lanes`, and when its shield overtakes; None without a shield."""
-    bare, overtakes = controllers.shield_of(name) or (name, None)
-    return bare == "lanes", None if overtakes is None else check_overtakes(overtakes)
 
 
 def broken_formulas(score: Score) -> dict[str, float]:
