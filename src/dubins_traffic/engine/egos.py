@@ -24,7 +24,7 @@ from dubins_traffic.policies.rules.fitness import check_fit, check_speeds
 from dubins_traffic.problem.kinds import ALONE, FREE, KEEP_RULES
 from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.scoring.metric import Maker as MetricMaker
-from dubins_traffic.shield.tables import check_overtakes
+from dubins_traffic.shield.tables import Overtakes, check_overtakes
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -72,7 +72,9 @@ class Egos:
         bare, overtakes = controllers.shield_of(spec) or (spec, None)
         self._apart = apart
         self._drives_lanes = uncounted and bare == "lanes"
-        self._overtakes = check_overtakes(overtakes) if self._drives_lanes and overtakes else None
+        self._overtakes: Overtakes | None = None
+        if self._drives_lanes and overtakes is not None:
+            self._overtakes = check_overtakes(overtakes)
 
     @cached_property
     def shared(self) -> BatchController | None:
