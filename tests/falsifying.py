@@ -7,8 +7,7 @@ from typing import Any
 
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.engine.group import Group
-from dubins_traffic.falsification.companies import Watched
-from dubins_traffic.falsification.splitting import Begin
+from dubins_traffic.falsification.splitting import Begin, Watched
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.instance import Instance, Problem
 

@@ -22,8 +22,7 @@ from selenium.webdriver.common.by import By
 
 from dubins_traffic.campaign import manifest
 from dubins_traffic.campaign.report.comparison import compare
-from dubins_traffic.campaign.report.page import page
-from dubins_traffic.campaign.report.write import write_report
+from dubins_traffic.campaign.report.write import page, write_report
 from dubins_traffic.campaign.results import load_results
 from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main

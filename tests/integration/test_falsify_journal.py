@@ -12,9 +12,9 @@ import pytest
 
 import dubins_traffic as dt
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsification import crew, search
-from dubins_traffic.falsification.genome import Genome
-from dubins_traffic.falsification.journal import Journal
+from dubins_traffic.falsification import search, trying
+from dubins_traffic.falsification.archive import Journal
+from dubins_traffic.falsification.moves import Genome
 from dubins_traffic.falsification.sampling import Source, prepared
 from dubins_traffic.falsification.trying import TrialRunner, Tried, in_order
 from tests.campaigns import COMMAND
@@ -172,13 +172,13 @@ def test_a_search_that_is_interrupted_before_it_has_used_its_journal_keeps_it(
             dt.falsify(a_minute("junction"), folder=out, trials=64, resume=True, **given)
     assert kept(out) == before
     handed: list[int] = []
-    real = crew.Elsewhere.run
+    real = trying.PoolRunner.run
 
-    def watched(own: crew.Elsewhere, instances: list[dt.Instance]) -> object:
+    def watched(own: trying.PoolRunner, instances: list[dt.Instance]) -> object:
         handed.append(len(instances))
         return real(own, instances)
 
-    monkeypatch.setattr(crew.Elsewhere, "run", watched)
+    monkeypatch.setattr(trying.PoolRunner, "run", watched)
     dt.falsify(a_minute("junction"), folder=out, trials=64, workers=2, resume=True, **given)
     assert handed == [32 - before, 32]
     assert whole(out) == whole(tmp_path / "plain")

@@ -9,8 +9,8 @@ import pytest
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.cli.main import main
 from dubins_traffic.engine.group import Group
-from dubins_traffic.falsification.companies import HASTE, Watched, beginner, coming
 from dubins_traffic.falsification.sampling import prepared
+from dubins_traffic.falsification.splitting import HASTE, Watched, beginner, coming
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import corridor
 from tests.minute import a_minute

@@ -14,7 +14,7 @@ from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report import terminal, worst
 from dubins_traffic.campaign.report.comparison import Comparison, compare
-from dubins_traffic.campaign.report.page import page
+from dubins_traffic.campaign.report.write import page
 from dubins_traffic.cli import tables
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.sink import BY_CONTROLLER

@@ -9,9 +9,8 @@ from typing import Any
 
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.report.comparison import WALL_METRICS, Comparison, Standing, shown
-from dubins_traffic.campaign.report.page import page
 from dubins_traffic.campaign.report.statistics import Estimate, Share, share
-from dubins_traffic.campaign.report.write import csv_files
+from dubins_traffic.campaign.report.write import csv_files, page
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, require_output, write_text
 from dubins_traffic.record.sink import BY_CONTROLLER, FAULTS
