@@ -36,10 +36,9 @@ from tests.mutants import MUTANTS
 from dubins_traffic.campaign.report.statistics import clopper_pearson
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.falsification import search
-from dubins_traffic.falsification.crew import Here
-from dubins_traffic.falsification.found import Found
+from dubins_traffic.falsification.archive import Found
 from dubins_traffic.falsification.search import GENERATION, falsify
-from dubins_traffic.falsification.trying import Tried
+from dubins_traffic.falsification.trying import LocalRunner, Tried
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
@@ -169,7 +168,7 @@ def spread(counts: Sequence[int | None], most: int) -> str:
     return f"{middle} ({len(counts) - len(known)} of {len(counts)} given up after {most:,}{least})"
 
 
-class _Watched(Here):
+class _Watched(LocalRunner):
     """Runs trials here, and keeps them."""
 
     seen: list[Instance]
@@ -207,7 +206,7 @@ def _taken(world: Configuration, trials: int) -> tuple[float, float]:
     crew.seen = []
 
     @contextmanager
-    def watched(*_: object) -> Iterator[Here]:
+    def watched(*_: object) -> Iterator[LocalRunner]:
         yield crew
 
     real = search.crew_of

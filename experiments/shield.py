@@ -25,7 +25,7 @@ from benchmarks.table import Row, show
 from dubins_traffic.cars.state import EGO, Pose
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.controllers.shield import Shield
-from dubins_traffic.engine.controlled import grouped
+from dubins_traffic.engine.egos import grouped
 from dubins_traffic.engine.group import Group
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.kernels.trig import sincos

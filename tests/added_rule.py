@@ -95,8 +95,8 @@ def counted() -> dict[str, Any]:
     Also what a search would tell of the last of these breaches, and whether it knows what to expect on these roads.
     """
     from dubins_traffic.envs.parallel import TrafficParallelEnv
+    from dubins_traffic.falsification.case import sentence_of
     from dubins_traffic.falsification.coverage import possible
-    from dubins_traffic.falsification.judging import sentence_of
 
     one, many = single(CONFIG), vector(2, CONFIG, autoreset_mode="Disabled")
     agents = TrafficParallelEnv(CONFIG)

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dubins_traffic.engine.controlled import Maker
-from dubins_traffic.falsification.case import Case
-from dubins_traffic.falsification.crew import maker, name_of
-from dubins_traffic.falsification.judging import Judged, confirm, judge
-from dubins_traffic.falsification.removals import lead
-from dubins_traffic.falsification.shrink import single_removals
-from dubins_traffic.falsification.trying import Laboratory, in_order
+from dubins_traffic.falsification.case import Case, Judged, confirm, judge
+from dubins_traffic.falsification.shrink import lead, single_removals
+from dubins_traffic.falsification.trying import TrialRunner, in_order, maker, name_of
 from dubins_traffic.scoring.verdict import Ruling
 from tests.mutants import MUTANTS
 
@@ -42,7 +39,7 @@ def still_broken(case: Case, driver: str | Maker) -> list[str]:
     left = single_removals(judged)
     assert left or not case.instance.e_agents
     rule, found = case.story.rule, []
-    tried = in_order(Laboratory(driver).attempt([instance for _, instance in left]))
+    tried = in_order(TrialRunner(driver).attempt([instance for _, instance in left]))
     for (what, instance), came in zip(left, tried, strict=True):
         if not any(cell.rule == rule for cell, _ in came.cells):
             continue

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import PARTS, Cast, Crew
+from dubins_traffic.envs.crew import Cast, Crew
 from dubins_traffic.envs.settings import Settings
-from dubins_traffic.envs.terms import TERM, WEIGHTS
+from dubins_traffic.envs.terms import PARTS, TERM, WEIGHTS
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.scoring.verdict import ASSUMPTIONS
 

@@ -13,10 +13,10 @@ from dubins_traffic.campaign.results import load_results
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsification.crew import Here
 from dubins_traffic.falsification.estimate import by_counting
 from dubins_traffic.falsification.sampling import prepared
 from dubins_traffic.falsification.search import falsify
+from dubins_traffic.falsification.trying import LocalRunner
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.runs.single import run_trial
@@ -267,7 +267,7 @@ def test_an_estimate_leaves_out_who_ended_a_trial_before_the_event_and_counts_wh
     left = sum(own.trial % 2 and not bad for own, bad in zip(drawn, broke, strict=True))
     assert 0 < left < 8, "some of both kinds"
     Wild.made = 0
-    once = by_counting(drawn, Here(Wild, "wild"), "1.road", 0.0, lambda _: None)
+    once = by_counting(drawn, LocalRunner(Wild, "wild"), "1.road", 0.0, lambda _: None)
     assert (once.trials, once.left_out, once.events) == (16, left, sum(broke))
     assert once.probability == sum(broke) / (16 - left)
     assert once.interval == clopper_pearson(sum(broke), 16 - left)

@@ -14,12 +14,10 @@ from dubins_traffic.campaign.report.statistics import clopper_pearson
 from dubins_traffic.cli.main import main
 from dubins_traffic.falsification import search
 from dubins_traffic.falsification.archive import files
-from dubins_traffic.falsification.case import Case, read_case
-from dubins_traffic.falsification.companies import Driven
+from dubins_traffic.falsification.case import Case, confirm, judge, read_case
 from dubins_traffic.falsification.estimate import by_counting, by_splitting, drawn
-from dubins_traffic.falsification.judging import confirm, judge
 from dubins_traffic.falsification.shrink import single_removals
-from dubins_traffic.falsification.splitting import Particle, follow, split
+from dubins_traffic.falsification.splitting import Particle, Watched, follow, split
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import NEAR, Rolling, corridor, standing
 from tests.minute import a_minute
@@ -192,7 +190,7 @@ def test_a_particle_that_branches_off_is_a_fork_bit_for_bit() -> None:
     begin = standing()
     whole = begin(instances)
     whole.advance(90)
-    twin = Driven(whole.group.fork(range(4), [7, 8, 9, 10]), whole.rule)
+    twin = Watched(whole.group.fork(range(4), [7, 8, 9, 10]), whole.rule)
     whole.reseed([7, 8, 9, 10])
     for own in (whole, twin):
         own.advance(instances[0].ticks - 90)
@@ -241,12 +239,12 @@ def test_an_event_of_one_in_a_million_is_estimated_with_fifty_thousand_trials() 
 
 @pytest.mark.path
 def test_monte_carlo_counts_what_the_judge_says() -> None:
-    from dubins_traffic.falsification.crew import Here
     from dubins_traffic.falsification.sampling import prepared
+    from dubins_traffic.falsification.trying import LocalRunner
 
     configuration = prepared(a_minute("junction"), 6.0, {})
     found = by_counting(
-        draw_many(configuration, 1, range(32)), Here("simple", "simple"), "3.stop", 0.0, lambda _: None
+        draw_many(configuration, 1, range(32)), LocalRunner("simple", "simple"), "3.stop", 0.0, lambda _: None
     )
     scores = dt.run_batch(configuration, "simple", trials=32, seed=1).sheet.trials
     broken = sum(

@@ -9,8 +9,8 @@ from typing import Any
 import pytest
 
 from dubins_traffic.cli.main import main
+from dubins_traffic.falsification.archive import Found
 from dubins_traffic.falsification.contract import BLOCKED, PROVOKED
-from dubins_traffic.falsification.found import Found
 from dubins_traffic.falsification.regress import regress
 from dubins_traffic.falsification.search import falsify
 from dubins_traffic.falsification.shrink import shrink

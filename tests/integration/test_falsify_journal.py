@@ -12,11 +12,11 @@ import pytest
 
 import dubins_traffic as dt
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsification import crew, search
-from dubins_traffic.falsification.genome import Genome
-from dubins_traffic.falsification.journal import Journal
+from dubins_traffic.falsification import search, trying
+from dubins_traffic.falsification.archive import Journal
+from dubins_traffic.falsification.moves import Genome
 from dubins_traffic.falsification.sampling import Source, prepared
-from dubins_traffic.falsification.trying import Laboratory, Tried, in_order
+from dubins_traffic.falsification.trying import TrialRunner, Tried, in_order
 from tests.campaigns import COMMAND
 from tests.minute import a_minute
 
@@ -103,7 +103,7 @@ def test_trials_of_a_slow_controller_are_kept_one_by_one(
 def test_what_came_of_a_trial_is_read_as_it_was_kept(tmp_path: Path) -> None:
     source = Source(prepared(a_minute("junction"), 8.0, {"soon": "[] !left_ego"}), 1)
     genomes = [source.fresh(number) for number in range(24)]
-    tried = in_order(Laboratory("simple").attempt(source.build(genomes)))
+    tried = in_order(TrialRunner("simple").attempt(source.build(genomes)))
     tried.append(Tried(True, True, {"1.road": float("inf")}, (), fault="raised: a\nb"))
     genomes.append(Genome(3, 3))
     journal = Journal(tmp_path / "journal.txt")
@@ -172,13 +172,13 @@ def test_a_search_that_is_interrupted_before_it_has_used_its_journal_keeps_it(
             dt.falsify(a_minute("junction"), folder=out, trials=64, resume=True, **given)
     assert kept(out) == before
     handed: list[int] = []
-    real = crew.Elsewhere.run
+    real = trying.PoolRunner.run
 
-    def watched(own: crew.Elsewhere, instances: list[dt.Instance]) -> object:
+    def watched(own: trying.PoolRunner, instances: list[dt.Instance]) -> object:
         handed.append(len(instances))
         return real(own, instances)
 
-    monkeypatch.setattr(crew.Elsewhere, "run", watched)
+    monkeypatch.setattr(trying.PoolRunner, "run", watched)
     dt.falsify(a_minute("junction"), folder=out, trials=64, workers=2, resume=True, **given)
     assert handed == [32 - before, 32]
     assert whole(out) == whole(tmp_path / "plain")

@@ -17,8 +17,7 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.controllers.registry import load
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.archive import files
-from dubins_traffic.falsification.case import read_case
-from dubins_traffic.falsification.judging import judge
+from dubins_traffic.falsification.case import judge, read_case
 from dubins_traffic.falsification.regress import regress
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.transports.lines_client import drive

@@ -15,8 +15,8 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification import search, strategies, trying
 from dubins_traffic.falsification.archive import files
-from dubins_traffic.falsification.judging import judge
-from dubins_traffic.falsification.liveness import limit_of
+from dubins_traffic.falsification.case import judge
+from dubins_traffic.falsification.contract import limit_of
 from dubins_traffic.falsification.regress import regress
 from dubins_traffic.falsification.search import falsify
 from dubins_traffic.falsification.trying import Tried

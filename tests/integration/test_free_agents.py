@@ -14,9 +14,8 @@ import pytest
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.controllers.shield import Shield
-from dubins_traffic.engine.controlled import grouped
+from dubins_traffic.engine.egos import can_share, grouped
 from dubins_traffic.engine.group import Group
-from dubins_traffic.engine.sharing import can_share
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance

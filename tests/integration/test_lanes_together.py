@@ -6,7 +6,7 @@ import pytest
 
 from dubins_traffic.controllers.registry import load
 from dubins_traffic.falsification.sampling import Source, prepared
-from dubins_traffic.falsification.trying import Laboratory, in_order
+from dubins_traffic.falsification.trying import TrialRunner, in_order
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.shield.tables import Overtakes
@@ -35,6 +35,6 @@ def test_trials_without_observations_equal_those_with(
 ) -> None:
     own = trials(world, seconds, count)
     name = "lanes" if overtakes is None else f"lanes+shield:{overtakes}"
-    fast = Laboratory(name).attempt(own)
-    slow = Laboratory(lambda: load(name)).attempt(own)
+    fast = TrialRunner(name).attempt(own)
+    slow = TrialRunner(lambda: load(name)).attempt(own)
     assert in_order(fast) == in_order(slow)

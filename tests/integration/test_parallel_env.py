@@ -17,9 +17,9 @@ from dubins_traffic.cars.state import Frames
 from dubins_traffic.envs.about_ego import NAMES
 from dubins_traffic.envs.citing import cited
 from dubins_traffic.envs.parallel import TrafficParallelEnv, parallel_env
-from dubins_traffic.envs.roles import PEER
 from dubins_traffic.envs.shielded import Shielded, others
 from dubins_traffic.envs.single import TrafficEnv
+from dubins_traffic.envs.terms import PEER
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance

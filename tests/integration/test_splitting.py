@@ -9,9 +9,8 @@ import pytest
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.cli.main import main
 from dubins_traffic.engine.group import Group
-from dubins_traffic.falsification.companies import HASTE, Driven, beginner, coming
-from dubins_traffic.falsification.crew import maker
 from dubins_traffic.falsification.sampling import prepared
+from dubins_traffic.falsification.splitting import HASTE, Watched, beginner, coming
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import corridor
 from tests.minute import a_minute
@@ -72,7 +71,7 @@ def test_a_level_is_never_above_the_margin_and_below_it_only_for_a_collision() -
     own = prepared(a_minute("junction"), 4.0, {})
     instances = list(draw_many(own, 3, range(16)))
     group = Group(instances, keeps_rules=True)
-    collision, clear = Driven(group, "1.collision"), Driven(group, "3.clear")
+    collision, clear = Watched(group, "1.collision"), Watched(group, "3.clear")
     lower = 0
     for _ in range(12):
         collision.advance(10)
@@ -86,7 +85,7 @@ def test_a_level_is_never_above_the_margin_and_below_it_only_for_a_collision() -
 def test_trials_that_go_on_from_other_seeds_meet_other_traffic(controller: str) -> None:
     own = traffic()[1].configuration
     instances = list(draw_many(own, 3, range(1)))
-    company = beginner(maker(controller), controller, "1.collision")(instances)
+    company = beginner(controller, "1.collision")(instances)
     company.advance(10)
     twins = company.fork([0] * 8)
     same, other = company.fork([0]), company.fork([0] * 8)

@@ -10,7 +10,8 @@ import pytest
 
 from dubins_traffic.cars.state import Command, Observation, Pose
 from dubins_traffic.engine.batch import failed, outcomes, run_batch
-from dubins_traffic.engine.controlled import BatchView, ask
+from dubins_traffic.engine.controlled import BatchView
+from dubins_traffic.engine.egos import Egos, ask
 from dubins_traffic.engine.group import Group
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, load_config
@@ -252,8 +253,14 @@ class Quitter:
 
 def test_plain_controllers_end_as_they_do_alone() -> None:
     config = configuration()
-    for own in ask([draw(config, SEED, k) for k in range(5)], Quitter, "Quitter", 2):
+    for own in ask([draw(config, SEED, k) for k in range(5)], Egos(Quitter), 2):
         assert own.ending == run_trial(draw(config, SEED, own.instance.trial), Quitter()).ending
+
+
+def test_trials_that_all_end_at_once_leave_their_places_to_the_rest() -> None:
+    config = configuration(duration_bounds=[1, 1])
+    found = [own.instance.trial for own in ask([draw(config, SEED, k) for k in range(5)], Egos(Stands), 2)]
+    assert found == [0, 1, 2, 3, 4]
 
 
 class Gives:
@@ -281,7 +288,7 @@ def test_only_who_stays_to_the_end_is_clean_and_counts(driver: type[Gives], tmp_
     instance = replace(
         drawn, problem=replace(drawn.problem, goals=(goal,)), starts=(Pose(float(x), float(y), 1.0, 0.0),)
     )
-    (own,) = ask([instance], driver, "driver", 1)
+    (own,) = ask([instance], Egos(driver), 1)
     single = run_trial(instance, driver(), record=tmp_path / "trial.mcap").score
     kept = score(read(tmp_path / "trial.mcap"))
     assert plain(own.score) == plain(single) == plain(kept)
@@ -310,7 +317,7 @@ def test_a_collision_among_others_is_near_or_not(lane: int, near: bool, tmp_path
     problem = replace(drawn.problem, e_agents=("agent0", "agent1"), rules={"assume_e1": 0})
     places = [on_lane(network, lane, 2.0, -0.3), *(on_lane(network, 3, s, -0.3) for s in (1.4, 2.0))]
     instance = replace(drawn, problem=problem, e_agents=agents, starts=tuple(Pose(*p) for p in places))
-    (own,) = ask([instance], Strays, "driver", 1)
+    (own,) = ask([instance], Egos(Strays), 1)
     single = run_trial(instance, Strays(), record=tmp_path / "trial.mcap").score
     assert plain(own.score) == plain(single) == plain(score(read(tmp_path / "trial.mcap")))
     found = single.verdict
@@ -389,7 +396,7 @@ def test_a_frame_in_which_every_goal_is_taken_finds_room_for_its_breaches(monkey
         run(*given)
 
     monkeypatch.setattr(group, "run_trials", counted)
-    (own,) = ask([draw(config, SEED, 0)], Stands, "driver", 1)
+    (own,) = ask([draw(config, SEED, 0)], Egos(Stands), 1)
     assert own.ending.end is End.DURATION
     assert len(own.score.goals) == 289
 

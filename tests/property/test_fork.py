@@ -19,7 +19,7 @@ from hypothesis import strategies as st
 import dubins_traffic as dt
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch_kernel import World
-from dubins_traffic.engine.controlled import Controlled
+from dubins_traffic.engine.controlled import AskedGroup
 from dubins_traffic.engine.group import Group
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.problem.draw import draw
@@ -350,15 +350,16 @@ def test_forks_of_a_batch_of_so_many_cars_that_they_are_looked_for_in_cells() ->
     ]
 
 
-def asked(controlled: Controlled, ticks: int = 10**6) -> dict[int, Any]:
+def asked(group: AskedGroup, ticks: int = 10**6) -> dict[int, Any]:
     """Let the controllers of a group drive for some ticks, or to the end; return what came of trials, by number."""
     found: dict[int, Any] = {}
-    while len(controlled.group.active) and ticks > 0:
+    while len(group.active) and ticks > 0:
         ticks -= 1
-        controlled.ask_each()
-        before = set(controlled.group.active.tolist())
-        ended = list(controlled.step("any"))
-        gone = sorted(before - set(controlled.group.active.tolist()))
+        group.decide()
+        before = set(group.active.tolist())
+        group.advance()
+        ended = group.fresh("any")
+        gone = sorted(before - set(group.active.tolist()))
         assert len(gone) == len(ended)
         found |= {b: (own.ending, plain(own.score)) for b, own in zip(gone, ended, strict=True)}
     return found
@@ -368,7 +369,7 @@ def asked(controlled: Controlled, ticks: int = 10**6) -> dict[int, Any]:
 @pytest.mark.parametrize("controller", ["rules", "lanes+shield"])
 def test_forks_of_trials_whose_controllers_are_asked_equal_the_trials(world: str, controller: str) -> None:
     config = configuration(KINDS[:4], world, True, seconds=3)
-    own = Controlled([draw(config, SEED, k) for k in range(2)], partial(controllers.load, controller), None)
+    own = AskedGroup([draw(config, SEED, k) for k in range(2)], partial(controllers.load, controller), None)
     assert asked(own, 40) == {}
     forks = own.fork([1, 0, 1])
     others = own.fork([1, 1], seeds=[SEED, SEED + 1])
@@ -381,7 +382,7 @@ def test_forks_of_trials_whose_controllers_are_asked_equal_the_trials(world: str
 
 def test_a_controller_of_whole_batches_does_not_go_on_twice() -> None:
     config = configuration((), "plain", rules=False)
-    own = Controlled([draw(config, SEED, 0)], Wheel, Wheel())
+    own = AskedGroup([draw(config, SEED, 0)], Wheel, Wheel())
     with pytest.raises(DubinsTrafficError, match="a BatchController can't be forked"):
         own.fork([0])
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from dubins_traffic.envs.blame import Blame
+from dubins_traffic.envs.crew import Blame
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.rules.referee import Breach

@@ -14,7 +14,7 @@ from pyarrow import parquet
 from dubins_traffic.campaign import manifest, rows
 from dubins_traffic.campaign.campaign import Campaign, load_campaign
 from dubins_traffic.campaign.folder import Folder, Keep, Records, opened, read_keep
-from dubins_traffic.campaign.worker import run_chunk
+from dubins_traffic.campaign.run_campaign import run_chunk
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from tests.campaigns import campaign, written
 

@@ -4,9 +4,9 @@ import base64
 import hashlib
 import re
 
+from dubins_traffic.falsification.archive import coverage_page
 from dubins_traffic.falsification.case import Case, Story
 from dubins_traffic.falsification.coverage import Cell, Manoeuvre, Row
-from dubins_traffic.falsification.found import coverage_page
 from dubins_traffic.problem.draw import draw
 from tests.minute import a_minute
 

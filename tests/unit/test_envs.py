@@ -18,10 +18,10 @@ from gymnasium.vector import AutoresetMode
 from dubins_traffic import load_config
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.controllers.scripted import Scripted
+from dubins_traffic.envs import NAMES
+from dubins_traffic.envs.channel import with_formulas
 from dubins_traffic.envs.episodes import Episodes, Levels
-from dubins_traffic.envs.formulas import with_formulas
 from dubins_traffic.envs.parallel import TrafficParallelEnv
-from dubins_traffic.envs.registration import NAMES
 from dubins_traffic.envs.terms import COSTS, TERMS
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.observations.flat import FlatObserver

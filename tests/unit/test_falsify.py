@@ -13,7 +13,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.archive import opened
 from dubins_traffic.falsification.case import Case, Story, read_case
 from dubins_traffic.falsification.coverage import CELLS, Cell, Manoeuvre, coverage, possible
-from dubins_traffic.falsification.genome import Genome
+from dubins_traffic.falsification.moves import Genome
 from dubins_traffic.falsification.passages import find_passages
 from dubins_traffic.falsification.sampling import Source, Stream, prepared
 from dubins_traffic.falsification.strategies import make

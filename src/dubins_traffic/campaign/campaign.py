@@ -95,11 +95,6 @@ class Campaign:
             The controllers, in place of those that the document names.
         metrics : (tuple of str, tuple of Column), optional
             The further metrics and their columns, in place of those that the document names.
-
-        Raises
-        ------
-        InputError
-            For the first thing wrong, with its field.
         """
         own = plain(document, file)
         model = parse(CampaignModel, own, file=file)
@@ -159,11 +154,6 @@ def load_campaign(path: str | os.PathLike[str], *, sandbox: str | None = None) -
     sandbox : str, optional
         Limits of a box for each controller (`controllers.registry.sandboxed`); by default they run as the file names
         them.
-
-    Raises
-    ------
-    InputError
-        If there is no such file or something in it is wrong.
     """
     name = os.fspath(path)
     document = read_toml(name, "a campaign file, TOML")

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 from dubins_traffic.campaign.settings import Scalar
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.problem.configuration import Configuration
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from dubins_traffic.runs.jobs import Job
 
 MOST_CAR_STEPS = 3_000_000
 """Car-steps of the largest chunks, about half a second: as much work is lost with a worker."""
@@ -73,6 +79,15 @@ class Chunk:
     def end(self) -> int:
         """The number after the last."""
         return self.number + self.count
+
+    def job(self, k: int, record: Path | None = None) -> Job:
+        """Return the job that runs trial k of the chunk, from 0, by itself."""
+        from dubins_traffic.runs.jobs import Job  # which needs all that runs trials
+
+        return Job(
+            self.trial + k, self.seed, self.controller, configuration=self.configuration, record=record,
+            overwrite=True, deadline=self.deadline, metrics=self.metrics,
+        )  # fmt: skip
 
     def part(self, number: int, end: int) -> Chunk:
         """Return the chunk of the trials from `number` up to before `end`."""

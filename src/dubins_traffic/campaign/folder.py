@@ -80,13 +80,7 @@ def is_failure(row: Mapping[str, Any]) -> bool:
 
 
 def read_keep(text: str) -> tuple[Keep, int]:
-    """Return what ``none``, ``all``, ``failures`` or ``sample:N`` asks for: of which trials, and N.
-
-    Raises
-    ------
-    InputError
-        If `text` is none of these.
-    """
+    """Return what ``none``, ``all``, ``failures`` or ``sample:N`` asks for: of which trials, and N."""
     word, colon, number = text.partition(":")
     if word == Keep.SAMPLE and number.isdecimal() and int(number) > 0:
         return Keep.SAMPLE, int(number)
@@ -132,24 +126,12 @@ class Folder:
         return found
 
     def keep(self, chunk: Chunk, part: bytes) -> None:
-        """Store the part of a chunk that has been run; once this returns, the part survives a loss of power.
-
-        Raises
-        ------
-        InputError
-            If it can't be written: a full disk, a folder without permission.
-        """
+        """Store the part of a chunk that has been run; once this returns, the part survives a loss of power."""
         path = self.path / PARTS / f"{chunk.number:09d}-{chunk.end - 1:09d}.parquet"
         replace_file(path, lambda neighbour: neighbour.write_bytes(part), durable=True)
 
     def finish(self) -> None:
-        """Merge the parts into the table, if that does not exist, and remove them.
-
-        Raises
-        ------
-        InputError
-            If it can't be written; the parts remain then.
-        """
+        """Merge the parts into the table, if that does not exist, and remove them."""
         if not self.finished:
             found = [path for _, _, path in parts(self.path)]
             for name, kind in ((table.WALL, table.Kind.WALL), (table.RESULTS, table.Kind.RESULTS)):

@@ -121,13 +121,7 @@ def write(folder: Path, campaign: Campaign, manifest: Mapping[str, Any]) -> None
 
 
 def read(folder: Path) -> dict[str, Any] | None:
-    """Return the manifest in `folder`; None if there is none.
-
-    Raises
-    ------
-    InputError
-        If it can't be read, is of another format, or what is read of it is of other kinds.
-    """
+    """Return the manifest in `folder`; None if there is none."""
     path = folder / NAME
     if not path.is_file():
         return None
@@ -153,13 +147,7 @@ def stored_document(folder: Path) -> dict[str, Any]:
 
 
 def stored_campaign(folder: Path, manifest: Mapping[str, Any]) -> Campaign:
-    """Return the campaign of `folder`, checked anew.
-
-    Raises
-    ------
-    InputError
-        If it is not the one that the manifest was made of.
-    """
+    """Return the campaign of `folder`, checked anew."""
     document = stored_document(folder)
     if _hash(document) != manifest["campaign"]:
         raise InputError(
@@ -187,12 +175,6 @@ def check_same(folder: Path, campaign: Campaign, records: str | None) -> dict[st
         What is to be resumed.
     records : str or None
         Which records are kept; None: as before.
-
-    Raises
-    ------
-    InputError
-        If a field of the file or of a configuration, a controller's file, the choice of records or the version of
-        this package is another; names it.
     """
     manifest = read(folder) or {}
     found = _difference(stored_document(folder), campaign.document, "")

@@ -207,11 +207,6 @@ def vary(document: Mapping[str, Any], factors: Mapping[str, Any], fields: Mappin
         Name of a factor of `Factors` to one of its values, as its model gives it.
     fields : Mapping
         Path of a field to its value.
-
-    Raises
-    ------
-    InputError
-        If a value has no place in this configuration; names the factor.
     """
     if not factors and not fields:
         return deepcopy(dict(document))
@@ -233,11 +228,6 @@ def put(document: Document, path: str, value: Any) -> None:
     """Set the field of `document` at `path`, such as ``car.bounds.speed`` or ``e-agents[0].count``.
 
     Objects on the way are made where there are none.
-
-    Raises
-    ------
-    InputError
-        If `path` is not one, or leads through what is not an object or not so long a list.
     """
     steps: list[str | int] = [name or int(index) for name, index in _STEP.findall(path)]
     if not steps or _written(steps) != path or isinstance(steps[0], int):

@@ -72,13 +72,7 @@ def merge(campaign: Campaign, parts: Sequence[Path], kind: Kind, target: Path) -
 
 
 def read(folder: Path, campaign: Campaign, parts: Sequence[Path], kind: Kind = Kind.RESULTS) -> Any:
-    """Return a table of a campaign, an Arrow table; of one that is not finished the rows that there are.
-
-    Raises
-    ------
-    InputError
-        If it can't be read.
-    """
+    """Return a table of a campaign, an Arrow table; of one that is not finished the rows that there are."""
     made = rows.arrow()
     whole = folder / (RESULTS if kind is Kind.RESULTS else WALL)
     try:

@@ -20,8 +20,7 @@ from dubins_traffic.cars.touching import Bodies
 from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.batch import outcomes
-from dubins_traffic.engine.controlled import BatchView, Maker
-from dubins_traffic.engine.lanes_together import LanesTogether
+from dubins_traffic.engine.controlled import BatchView, LanesGroup, Maker
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.observations.flat import FlatObserver
@@ -67,7 +66,7 @@ def moments() -> Iterator[Callable[[], object]]:
         for name in (driver, shielded[0]):
             yield partial(_together, pair, name)
     yield partial(list, draw_many(load_config("town"), 0, range(MANY)))
-    yield lambda: LanesTogether(pair, "sure").step()
+    yield lambda: LanesGroup(pair, "sure").drive(1)
     visited = "visit_ego_{}_{}".format(*town.problem.goals[0])
     problem = replace(town.problem, laser=Laser(), formulas={**FORMULAS, "again": f"[] <> {visited}"})
     noise = Disturbances(position_noise=0.01, heading_noise=0.01, command_delay=1, command_loss=0.1)

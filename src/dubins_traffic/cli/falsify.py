@@ -15,8 +15,8 @@ from dubins_traffic.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Generator, Sequence
 
+    from dubins_traffic.falsification.archive import Found
     from dubins_traffic.falsification.coverage import Row
-    from dubins_traffic.falsification.found import Found
     from dubins_traffic.falsification.remote import Remote
     from dubins_traffic.falsification.search import Search
 
@@ -169,7 +169,7 @@ def shrink(
     shield: options.Shield = False,
 ) -> None:
     """Take away from a case what its failure does not need; write what is left, with its replay page."""
-    from dubins_traffic.falsification.judging import write_page
+    from dubins_traffic.falsification.case import write_page
     from dubins_traffic.falsification.shrink import shrink as smaller
     from dubins_traffic.problem.files import DOCUMENTS
     from dubins_traffic.viewer.pages import PAGES

@@ -13,20 +13,17 @@ from pathlib import Path
 from threading import Event
 from typing import TYPE_CHECKING
 
-from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.controllers.registry import COMPILED
-from dubins_traffic.engine.controlled import Maker, ask, grouped
-from dubins_traffic.engine.group import Group, Outcome
-from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
+from dubins_traffic.engine.controlled import Maker
+from dubins_traffic.engine.egos import Egos, Way, ask, called, grouped, outcome_of
+from dubins_traffic.engine.group import Outcome
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import locked
-from dubins_traffic.outside import put_back
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw, draw_many
-from dubins_traffic.protocols import Controller, End
+from dubins_traffic.protocols import End
 from dubins_traffic.runs.record_folder import check_folder, claim
 from dubins_traffic.runs.record_folder import name as record_name
-from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import Maker as MetricMaker
 from dubins_traffic.scoring.metric import MetricSpec
@@ -154,11 +151,6 @@ def in_order(found: Iterable[Outcome]) -> Batch:
     return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
 
 
-def called(controller: str | Maker) -> str:
-    """Return the name of a controller that is given by its name or as a callable that makes it."""
-    return controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
-
-
 def outcomes(
     instances: Iterable[Instance],
     controller: str | Maker = COMPILED,
@@ -172,42 +164,24 @@ def outcomes(
     The parameters are those of `run_batch`. Instances are taken from their iterator when they are needed. Trials that
     can't be batched (another simulator, formulas of the user's) run by themselves.
     """
-    name = called(controller)
-    make = _maker(controller)
-    make()
-    source = iter(instances)
-    if controller != COMPILED:
-        yield from _apart(
-            source, make, name, metrics, lambda rest: ask(rest, make, name, batch, metrics=metrics)
-        )
+    egos = Egos(controller)
+    egos.make()
+    if not egos.is_compiled:
+        yield from ask(instances, egos, batch, metrics=metrics)
         return
     cancelled = Event()
     waiting: deque[Future[list[Outcome]]] = deque()
-    groups = _groups(source, batch, threads)
+    groups = _groups(iter(instances), batch, threads)
     with ThreadPoolExecutor(threads) as pool:
         try:
             while True:
                 for taken in islice(groups, UNDER_WAY * threads - len(waiting)):
-                    waiting.append(pool.submit(_compiled_or_alone, taken, cancelled, metrics))
+                    waiting.append(pool.submit(_run, taken, egos, cancelled, metrics))
                 if not waiting:
                     return
                 yield from waiting.popleft().result()
         finally:
             cancelled.set()
-
-
-def _maker(controller: str | Maker) -> Maker:
-    """Return what makes a controller; by name from the present folder, wherever those before it have gone."""
-    if not isinstance(controller, str):
-        return controller
-    here = Path.cwd()
-
-    def make() -> Controller:
-        with put_back():
-            os.chdir(here)
-            return controllers.load(controller)
-
-    return make
 
 
 def _groups(source: Iterator[Instance], batch: int, threads: int) -> Iterator[list[Instance]]:
@@ -222,83 +196,39 @@ def _groups(source: Iterator[Instance], batch: int, threads: int) -> Iterator[li
         yield [ahead.popleft() for _ in range(min(count, batch, len(ahead)))]
 
 
+def _run(
+    instances: Sequence[Instance], egos: Egos, cancelled: Event, metrics: Sequence[MetricMaker]
+) -> list[Outcome]:
+    return list(run_together(instances, egos, cancelled.is_set, metrics, alone=True))
+
+
 def run_together(
     instances: Sequence[Instance],
-    controller: str,
+    egos: Egos,
     cancelled: Callable[[], bool],
     metrics: Sequence[MetricMaker] = (),
+    *,
+    alone: bool = False,
 ) -> Iterator[Outcome]:
     """Run trials of instances, as many as possible stepped together, and yield the outcome of each.
+
+    The others run by themselves if `alone`; else they are left out.
 
     Raises
     ------
     KeyboardInterrupt
         When `cancelled`, which is called now and then, returns true.
     """
-    fit = fitness()
-    able = [own for own in instances if can_share(own) and (controller != COMPILED or fit(own))]
-    if controller == COMPILED:
-        yield from _compiled(able, cancelled, metrics)
-    else:
-        yield from ask(able, _maker(controller), controller, ASKED, cancelled, metrics)
-    if cancelled():
-        raise KeyboardInterrupt
-
-
-def _compiled_or_alone(
-    instances: Sequence[Instance], cancelled: Event, metrics: Sequence[MetricMaker]
-) -> list[Outcome]:
-    """Run trials whose egos the compiled controller `rules` drives; those that can't be batched run by themselves."""
-    fit = fitness()
-    able = [can_share(instance) and fit(instance) for instance in instances]
-    alone = [own for own, shares in zip(instances, able, strict=True) if not shares]
-    together = [own for own, shares in zip(instances, able, strict=True) if shares]
-    return [
-        *(_alone(own, _maker(COMPILED), COMPILED, metrics) for own in alone),
-        *_compiled(together, cancelled.is_set, metrics),
-    ]
-
-
-def _compiled(
-    instances: Sequence[Instance], cancelled: Callable[[], bool], metrics: Sequence[MetricMaker]
-) -> Iterator[Outcome]:
-    for own in grouped([instance for instance in instances if undisturbed(instance)]):
-        group = Group(own, keeps_rules=True, metrics=metrics)
+    ways = egos.ways(instances)
+    if alone:
+        yield from (outcome_of(egos.alone(own, metrics=metrics)) for own in ways[Way.ALONE])
+    for own in grouped(ways[Way.COMPILED]):
+        group = egos.group(own, Way.COMPILED, metrics)
         group.finish(cancelled)
         if not cancelled():
-            yield from group.outcomes(range(len(own)), COMPILED)
-    asked = [instance for instance in instances if not undisturbed(instance)]
-    if asked:
-        yield from ask(asked, _maker(COMPILED), COMPILED, len(asked), cancelled, metrics)
-
-
-def _apart(
-    source: Iterator[Instance],
-    make: Maker,
-    name: str,
-    metrics: Sequence[MetricMaker],
-    run: Callable[[Iterator[Instance]], Iterator[Outcome]],
-) -> Iterator[Outcome]:
-    """Run the trials that can't be batched by themselves, and pass all others to `run`; yield all outcomes."""
-    done: list[Outcome] = []
-
-    def rest() -> Iterator[Instance]:
-        for instance in source:
-            if can_share(instance):
-                yield instance
-            else:
-                done.append(_alone(instance, make, name, metrics))
-
-    for outcome in run(rest()):
-        while done:
-            yield done.pop(0)
-        yield outcome
-    yield from done
-
-
-def _alone(instance: Instance, make: Maker, name: str, metrics: Sequence[MetricMaker]) -> Outcome:
-    result = run_trial(instance, controllers.made(make), name=name, metrics=metrics)
-    return Outcome(instance, result.ending, result.score)
+            yield from group.fresh(egos.name)
+    most = len(ways[Way.ASKED]) if egos.is_compiled else ASKED
+    yield from ask(ways[Way.ASKED], egos, most, cancelled, metrics)
 
 
 def _recorded(
@@ -310,7 +240,7 @@ def _recorded(
     metrics: Sequence[MetricMaker],
 ) -> Iterator[Outcome]:
     """Yield outcomes; run each trial whose record is to be kept once more for it, unless its record is `there`."""
-    place, make = folder.absolute(), _maker(controller)  # controllers may go to other folders
+    place, egos = folder.absolute(), Egos(controller)  # controllers may go to other folders
     with locked(folder):
         for outcome in each:
             record = place / record_name(outcome.instance.trial)
@@ -320,11 +250,9 @@ def _recorded(
             elif record.name in there:
                 yield replace(outcome, score=replace(outcome.score, record=told))
             else:
-                driver = controllers.made(make)
-                result = run_trial(
-                    outcome.instance, driver, record=record, overwrite=record.exists(),
-                    name=called(controller), metrics=metrics,
-                )  # fmt: skip
+                result = egos.alone(
+                    outcome.instance, record=record, overwrite=record.exists(), metrics=metrics
+                )
                 yield replace(outcome, ending=result.ending, score=replace(result.score, record=told))
 
 

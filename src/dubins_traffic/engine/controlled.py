@@ -1,13 +1,11 @@
-"""Batched trials whose egos are driven by controllers in Python, asked in every tick: one a trial, or one for all."""
+"""Groups of trials whose egos are driven from Python in every tick: by controllers that are asked, or by `lanes`."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from copy import copy
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from itertools import islice
-from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol, Self, runtime_checkable
 
 import numpy as np
 import numpy.typing as npt
@@ -15,19 +13,23 @@ import numpy.typing as npt
 from dubins_traffic.cars.sensing import mark_sensed
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.controllers import blame
+from dubins_traffic.controllers.lanes import Lanes
 from dubins_traffic.controllers.registry import made
 from dubins_traffic.engine.group import Group, Outcome
 from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.observations.senses import Senses
-from dubins_traffic.protocols import Controller, End
+from dubins_traffic.protocols import Controller
 from dubins_traffic.record.sink import SHIELD
 from dubins_traffic.record.wall import summary
 from dubins_traffic.scoring.metric import Maker as MetricMaker
+from dubins_traffic.shield.car_shields import EgoShields
+from dubins_traffic.shield.tables import Overtakes
 from dubins_traffic.trial.disturbance import CommandLine
+from dubins_traffic.trial.endings import checked_command
 from dubins_traffic.trial.forking import forked
-from dubins_traffic.trial.seat import Seat, fault
+from dubins_traffic.trial.seat import Answerable, Seat, fault
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
@@ -74,9 +76,26 @@ class BatchController(Controller, Protocol):
 
 
 Maker = Callable[[], Controller]
+STAND = (0.0, 0.0)
+"""The command of an ego whose trial has ended."""
 
 
-class Controlled:
+class SteppedGroup(Group):
+    """Trials whose egos somebody in Python drives, a tick at a time."""
+
+    def drive(self, ticks: int) -> None:
+        """Take each trial that has not ended up to `ticks` ticks farther; decide on commands before each."""
+        for _ in range(ticks):
+            self.decide()
+            self.advance()
+
+    def finish(self, cancelled: Callable[[], bool] = lambda: False) -> None:
+        """Run all trials to their ends; stop between ticks when `cancelled`."""
+        while len(self.active) and not cancelled():
+            self.drive(1)
+
+
+class AskedGroup(SteppedGroup):
     """A group of trials and the controllers that drive their egos.
 
     Parameters
@@ -91,11 +110,6 @@ class Controlled:
         Each makes a further metric of a trial.
     numbers : sequence of int, optional
         The numbers of the trials for the shared controller; by default their own, which must then differ.
-
-    Attributes
-    ----------
-    group : Group
-        The trials.
     """
 
     def __init__(
@@ -106,13 +120,16 @@ class Controlled:
         metrics: Sequence[MetricMaker] = (),
         numbers: Sequence[int] | None = None,
     ) -> None:
-        self.group = Group(instances, keeps_rules=False, metrics=metrics)
+        super().__init__(instances, keeps_rules=False, metrics=metrics)
+        if shared is not None:
+            check_clear(instances)
+        self._shared = shared
         self._lines = [CommandLine(instance) for instance in instances]
         self._senses = [Senses(instance) for instance in instances] if shared is None else []
         self._seats = [Seat(made(make)) for _ in instances] if shared is None else []
         self._clear = all(line.clear for line in self._lines)
         self._interventions = [0] * len(instances)
-        self._told = np.zeros(len(instances), dtype=bool)
+        self._closed = np.zeros(len(instances), dtype=bool)
         own = [instance.trial for instance in instances] if numbers is None else numbers
         self._trials = np.array(own)
         self._look()
@@ -123,20 +140,21 @@ class Controlled:
                 raise
             except BaseException as error:
                 blame.show(error)
-                self.fail(error)
+                self.fail_all(error)
         for b, (seat, instance) in enumerate(zip(self._seats, instances, strict=False)):
             try:
                 seat.start(instance.problem)
             except ControllerError as error:
-                self._end(b, error)
+                self.fail(b, error)
+        self._close()
 
     def _look(self) -> None:
         """Set up what each ego observes, and where the reports of its controller go."""
-        trials = range(len(self.group.instances))
-        self._views = [self.group.of_trial(b) for b in trials]
+        trials = range(len(self.instances))
+        self._views = [self.of_trial(b) for b in trials]
         self._notes = [partial(self._hear, b) for b in trials]
 
-    def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Controlled:
+    def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Self:
         """Return forks of some trials, as `Group.fork` does; each goes on with a deep copy of its controller.
 
         Raises
@@ -148,164 +166,179 @@ class Controlled:
         """
         if not self._seats:
             raise DubinsTrafficError("trials of a BatchController can't be forked: it knows trials by number")
-        twin = copy(self)
-        twin.group = self.group.fork(trials, seeds)
+        twin = super().fork(trials, seeds)
         own: list[Any] = []
-        for b, instance in zip(trials, twin.group.instances, strict=True):
+        for b, instance in zip(trials, twin.instances, strict=True):
             mine = self._lines[b], self._senses[b], self._seats[b]
-            own.append(forked(mine, self.group.instances[b], instance))
+            own.append(forked(mine, self.instances[b], instance))
         twin._lines, twin._senses, twin._seats = map(list, zip(*own, strict=True))
         twin._interventions = [self._interventions[b] for b in trials]
-        twin._told = np.zeros(len(trials), dtype=bool)
+        twin._closed = np.zeros(len(trials), dtype=bool)
         twin._trials = self._trials[list(trials)]
         twin._look()
         return twin
 
-    def ask_each(self) -> None:
-        """Ask the controller of each running trial for its command."""
-        group = self.group
-        active: list[int] = group.active.tolist()
+    def reseeded(self, seeds: Sequence[int]) -> Self:
+        """Return forks of all trials, each of which draws from another seed from here on."""
+        return self.fork(range(len(seeds)), seeds)
+
+    def decide(self) -> None:
+        """Ask the controllers of all running trials for the commands of the coming tick."""
+        if self._shared is not None:
+            ask_all([self], self._shared)
+            return
+        active: list[int] = self.active.tolist()
         for b in active:
-            seen = self._senses[b].observe(int(group.ticks[b]), *self._views[b])
+            seen = self._senses[b].observe(int(self.ticks[b]), *self._views[b])
             try:
                 command = self._seats[b].act(seen, self._notes[b])
             except ControllerError as error:
-                self._end(b, error)
+                self.fail(b, error)
             else:
                 self.take(b, seen.tick, command)
+
+    def advance(self, most: int = 1) -> None:
+        """Step each trial that has not ended by up to `most` ticks; close the controllers of those that end."""
+        super().advance(most)
+        self._close()
+
+    def _close(self) -> None:
+        ended = np.flatnonzero(~self._closed & ~self._going)
+        self._closed[ended] = True
+        for b in ended.tolist() if self._seats else ():
+            ending = self.endings[b]
+            self.endings[b] = None if ending is None else self._seats[b].end(ending)
 
     def take(self, b: int, tick: int, command: object) -> None:
         """Let a command take effect in trial b, or end the trial if it is not two finite numbers."""
         try:
-            self.group.commands[b, EGO] = self._lines[b].take(tick, command)
+            self.commands[b, EGO] = self._lines[b].take(tick, command)
         except ControllerError as error:
-            self._end(b, error)
+            self.fail(b, error)
 
     def take_all(self, ticks: Ints, commands: Floats) -> None:
         """Let the commands of all running trials take effect, (K, 2); one that is not finite ends its trial."""
-        group = self.group
         if self._clear and np.isfinite(commands).all():
-            group.commands[group.active, EGO] = commands
+            self.commands[self.active, EGO] = commands
             return
-        for b, tick, command in zip(group.active.tolist(), ticks.tolist(), commands.tolist(), strict=True):
+        for b, tick, command in zip(self.active.tolist(), ticks.tolist(), commands.tolist(), strict=True):
             self.take(b, tick, command)
-
-    def _end(self, b: int, error: ControllerError) -> None:
-        self.group.end(b, End(error.reason), error.detail)
 
     def _hear(self, b: int, kind: str, detail: str) -> None:
         """Pass the report of a controller to the metrics of trial b, and count the interventions of a shield."""
         self._interventions[b] += kind == SHIELD
-        self.group.note(b, kind, detail)
+        self.note(b, kind, detail)
 
     def view(self, places: int) -> BatchView:
         """Return what a BatchController is shown of these trials, with `places` columns for cars."""
-        group = self.group
-        b = group.active
-        missing = places - group.state.x.shape[1]
-        arrays: list[Any] = [array[b] for array in (*group.state[:6], *group.labels)]
+        b = self.active
+        missing = places - self.state.x.shape[1]
+        arrays: list[Any] = [array[b] for array in (*self.state[:6], *self.labels)]
         if missing:
             arrays = [np.pad(array, ((0, 0), (0, missing))) for array in arrays]
-        count = group.state.count[b]
+        count = self.state.count[b]
         sensed = np.zeros((len(b), places), dtype=np.int64)
-        mark_sensed(b, np.ascontiguousarray(group.world.progress.trial["sight2"]), group.state, sensed)
+        mark_sensed(b, np.ascontiguousarray(self.world.progress.trial["sight2"]), self.state, sensed)
         seen = sensed != 0
         hidden = ~seen
         for array, nothing in zip(arrays, (*[np.nan] * 6, 0, -1, -1, -1, 0), strict=True):
             array[hidden] = nothing
         state, labels = State(*arrays[:6], count=count), Labels(*arrays[6:])
-        return BatchView(self._trials[b], group.ticks[b], state, labels, seen)
+        return BatchView(self._trials[b], self.ticks[b], state, labels, seen)
 
-    def fail(self, error: BaseException) -> None:
+    def fail_all(self, error: BaseException) -> None:
         """End all trials with a fault of their controller."""
-        for b in self.group.active.tolist():
-            self._end(b, fault(error, int(self.group.ticks[b])))
+        for b in self.active.tolist():
+            self.fail(b, fault(error, int(self.ticks[b])))
 
-    def step(self, controller: str) -> Iterator[Outcome]:
-        """Step all trials by a tick; yield the outcomes of those that have ended."""
-        self.group.advance()
-        ended: list[int] = np.flatnonzero(
-            ~self._told & [ending is not None for ending in self.group.endings]
-        ).tolist()
-        for b in ended:
-            self._told[b] = True
-            ending = self.group.endings[b]
-            if self._seats and ending is not None:
-                self.group.endings[b] = self._seats[b].end(ending)
-        begin = {b: seat.begin for b, seat in enumerate(self._seats)}
-        for b, outcome in zip(ended, self.group.outcomes(ended, controller, begin), strict=True):
+    def outcomes(self, trials: Sequence[int], controller: str) -> list[Outcome]:
+        """Return the outcomes of trials that have ended, with what their controllers took and their shields did."""
+        found: list[Outcome] = []
+        for b, outcome in zip(trials, super().outcomes(trials, controller), strict=True):
             score = replace(outcome.score, interventions=self._interventions[b])
-            yield replace(
-                outcome, score=score, act_s=summary(self._seats[b].latencies if self._seats else ())
-            )
+            latencies = summary(self._seats[b].latencies if self._seats else ())
+            found.append(replace(outcome, score=score, act_s=latencies))
+        return found
+
+    def _time_to_begin(self, b: int) -> float | None:
+        return self._seats[b].begin if self._seats else None
 
 
-def grouped(instances: Sequence[Instance]) -> list[list[Instance]]:
-    """Return instances in groups that can be stepped together: of one control rate, width and length of trails."""
-    groups: dict[tuple[float, float, float], list[Instance]] = {}
-    for instance in instances:
-        gap = max((agent.driver.parameters.get("gap") or 0.0 for agent in instance.e_agents), default=0.0)
-        groups.setdefault((instance.problem.rate, instance.problem.car.w, gap), []).append(instance)
-    return list(groups.values())
+class LanesGroup(SteppedGroup):
+    """Trials whose egos the controller `lanes` drives without observations, under a shield or not.
 
-
-def ask(
-    instances: Iterable[Instance],
-    make: Maker,
-    controller: str,
-    batch: int,
-    cancelled: Callable[[], bool] = lambda: False,
-    metrics: Sequence[MetricMaker] = (),
-) -> Iterator[Outcome]:
-    """Run trials, `batch` at a time, and yield the outcome of each when it ends; another trial then takes its place.
-
-    It calls `cancelled` in every tick and raises KeyboardInterrupt if that returns true.
+    Verdicts, metrics and endings are those of the same trials with the controllers ``lanes`` or ``lanes+shield``, bit
+    for bit, in a fraction of the time: what the egos see is read where it stands, and one kernel shields them all. What
+    the shield does is not counted.
 
     Parameters
     ----------
-    instances
-        One for each trial.
-    make
-        Makes the controller: one for each trial, or one for all if it is a `BatchController`.
-    controller
-        Name of the controller, for the outcomes.
-    batch
-        Most trials that run at a time.
-    metrics
-        Each makes a further metric for a trial.
+    instances : sequence of Instance
+        One a trial, of cars that can keep the rules, undisturbed.
+    overtakes : {"sure", "law", "never"} or None
+        When the shield lets an ego cross the centre line; None: there is no shield.
     """
-    made = make()
-    shared = made if isinstance(made, BatchController) else None
-    waiting = iter(instances)
-    seats: list[Controlled] = []
-    while True:
-        if cancelled():
-            raise KeyboardInterrupt
-        free = batch - sum(len(own.group.active) for own in seats)
-        taken = list(islice(waiting, free)) if 8 * free >= batch else []
-        for own in grouped(taken):
-            if shared is not None:
-                check_clear(own)
-            seats.append(Controlled(own, make, shared, metrics))
-        if not seats:
-            return
-        if shared is None:
-            for own in seats:
-                own.ask_each()
-        else:
-            ask_all(seats, shared)
-        for own in seats:
-            yield from own.step(controller)
-        seats = [own for own in seats if len(own.group.active)]
+
+    def __init__(self, instances: Sequence[Instance], overtakes: Overtakes | None) -> None:
+        super().__init__(instances, keeps_rules=False)
+        problems = [instance.problem for instance in instances]
+        self._shields = None
+        if overtakes is not None:
+            self._shields = EgoShields(problems, self.state, self.labels, overtakes=overtakes)
+        self._ticks = np.full(len(instances), -1)
+        self._guard = Answerable()
+        self._lanes = [(Lanes(), problem.sensing_radius) for problem in problems]
+        for b, ((lanes, _), problem) in enumerate(zip(self._lanes, problems, strict=True)):
+            try:
+                with self._guard:
+                    lanes.start(problem)
+            except ControllerError as error:
+                self.fail(b, error)
+
+    def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Self:  # noqa: ARG002  # refused
+        """Refuse: what `lanes` and the shields of these trials know is not copied."""
+        raise DubinsTrafficError("trials that `lanes` drives without observations can't be forked")
+
+    def decide(self) -> None:
+        """Write the commands of the egos of all running trials."""
+        now: list[int] = self.ticks.tolist()
+        driven: list[int] = self.active.tolist()
+        commands = [self._command(b, now[b]) for b in driven]
+        if driven:
+            self.commands[driven, EGO] = commands
+        if self._shields is not None:
+            self._ticks[:] = -1
+            self._ticks[self.active] = self.ticks[self.active]
+            self._shields.filter(self._ticks, self.commands)
+
+    def _command(self, b: int, tick: int) -> tuple[float, float]:
+        """Return the command of the ego of trial b; a fault ends the trial.
+
+        The guard, whose `with` takes as long as some commands, is entered only when something has been raised.
+        """
+        lanes, radius = self._lanes[b]
+        try:
+            command = lanes.act_in(b, tick, radius, self.state)
+            return command if self._shields is not None else checked_command(command, tick)
+        except ControllerError as error:
+            self.fail(b, error)
+        except Exception:
+            self._guard.tick = tick
+            try:
+                with self._guard:
+                    raise
+            except ControllerError as error:
+                self.fail(b, error)
+        return STAND
 
 
-def ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
+def ask_all(groups: Sequence[AskedGroup], controller: BatchController) -> None:
     """Ask one controller for the commands of all egos."""
-    seats = [own for own in seats if len(own.group.active)]
-    if not seats:
+    groups = [own for own in groups if len(own.active)]
+    if not groups:
         return
-    places = max(own.group.state.x.shape[1] for own in seats)
-    views = [own.view(places) for own in seats]
+    places = max(own.state.x.shape[1] for own in groups)
+    views = [own.view(places) for own in groups]
     whole = BatchView(
         np.concatenate([view.trial for view in views]),
         np.concatenate([view.tick for view in views]),
@@ -321,11 +354,11 @@ def ask_all(seats: Sequence[Controlled], controller: BatchController) -> None:
         raise
     except BaseException as error:
         blame.show(error)
-        for own in seats:
-            own.fail(error)
+        for own in groups:
+            own.fail_all(error)
         return
     row = 0
-    for own, view in zip(seats, views, strict=True):
+    for own, view in zip(groups, views, strict=True):
         own.take_all(view.tick, answer[row : row + len(view.tick)])
         row += len(view.tick)
 

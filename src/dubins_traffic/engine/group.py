@@ -1,22 +1,30 @@
-"""A group of trials that are stepped together: their tables, steps and outcomes."""
+"""A group of trials that are stepped together: their tables, steps, forks and outcomes.
+
+A fork has copies of the rows of its trials out of all tables. Tables hold one row per trial, with three exceptions:
+goals and obstacles stand one trial after another, with offsets; the ego's path, for each car that follows it, stands
+in the row that the car names. What no trial changes (roads, lanes of loops, scripts, stages) is shared by a group and
+its forks.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Self, TypeVar
 
 import numpy as np
+import numpy.typing as npt
 
 from dubins_traffic.agents.fleet import PAIRS, pack_agents
-from dubins_traffic.agents.free import free_tables
+from dubins_traffic.agents.free import Free, free_tables
 from dubins_traffic.agents.lawful import pack_drivers
-from dubins_traffic.agents.tables import wider, workspace
-from dubins_traffic.cars.clip_and_move import TOGETHER
+from dubins_traffic.agents.tables import Agents, wider, workspace
+from dubins_traffic.cars.clip_and_move import TOGETHER, rows
 from dubins_traffic.cars.motion import enlarged
 from dubins_traffic.cars.near import spacing
 from dubins_traffic.cars.state import EGO, Contact, Event, Labels, State
+from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.engine.batch_kernel import (
     STATUS,
     BreachPlace,
@@ -26,30 +34,32 @@ from dubins_traffic.engine.batch_kernel import (
     World,
     run_trials,
 )
-from dubins_traffic.engine.fork import world_of
-from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.errors import ControllerError, DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import is_quick
 from dubins_traffic.kernels.records import Rows, table
+from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.tables import KIND, scratch
 from dubins_traffic.problem.kinds import FREE, KEEP_RULES, NUDGED, REMOTE
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.header import bare_name
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.routing.rounds import find_all, stages
-from dubins_traffic.rules.breach_log import MOST, BreachLog, FoundBreach, RefereeTables
+from dubins_traffic.rules.breach_log import MOST, BreachLog, FoundBreach, RefereeParameters, RefereeTables
 from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import distinct_problems
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, accused, breach_of, order, pending_of, terms_of
+from dubins_traffic.rules.tables import LabelTables, spread
 from dubins_traffic.scoring.findings import Findings
 from dubins_traffic.scoring.margins import EgoMargins, margin_rules
 from dubins_traffic.scoring.metric import Maker
 from dubins_traffic.scoring.own_metrics import OwnMetrics
 from dubins_traffic.scoring.score import Score, score_of
-from dubins_traffic.scoring.tally import new_tally, tally_margins
+from dubins_traffic.scoring.tally import Tally, new_tally, tally_margins
+from dubins_traffic.shield.tables import Alone, ShieldTables
 from dubins_traffic.simulators.embedded import Embedded, contact_of
 from dubins_traffic.trial.buffer import FrameBuffer
 from dubins_traffic.trial.endings import agent_fault, collision_detail
@@ -58,6 +68,7 @@ from dubins_traffic.trial.forking import reseeded
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
+Table = TypeVar("Table", bound=Tables)
 FRAMES = 16
 """Frames, each with all breaches that are possible, for which the breach log has rows."""
 WORK = 500_000
@@ -140,6 +151,7 @@ class Group:
         self.commands: Floats = np.zeros((trials, places, 2))
         self.endings: list[Ending | None] = [None] * trials
         self._going = np.ones(trials, dtype=bool)
+        self._told = np.zeros(trials, dtype=bool)
         self.contacts: list[list[Contact]] = [[] for _ in instances]
         self.breaches: list[list[Breach]] = [[] for _ in instances]
         self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
@@ -157,7 +169,7 @@ class Group:
         numbers: list[int] = index.tolist()
         self._rules = [rules[k] for k in numbers]
 
-    def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Group:
+    def fork(self, trials: Sequence[int], seeds: Sequence[int] | None = None) -> Self:
         """Return a group of independent copies of some trials at their present frames.
 
         Parameters
@@ -183,11 +195,11 @@ class Group:
             self.instances[b] if seeds is None else replace(self.instances[b], seed=seeds[k])
             for k, b in enumerate(trials)
         )
-        twin._world = world_of(self._world, taken, drawn, 1.0 / self._rate)
+        twin._world = _forked(self._world, taken, drawn, 1.0 / self._rate)
         twin.state, twin.labels = twin._world.state, twin._world.labels
         twin.commands = self.commands[taken]
         twin.endings = [None] * len(trials)
-        twin._going = np.ones(len(trials), dtype=bool)
+        twin._going, twin._told = np.ones(len(trials), dtype=bool), np.zeros(len(trials), dtype=bool)
         twin.contacts = [list(self.contacts[b]) for b in trials]
         twin.breaches = [list(self.breaches[b]) for b in trials]
         twin._seen = [set(self._seen[b]) for b in trials]
@@ -199,6 +211,14 @@ class Group:
                 if seed != self.instances[trials[k]].seed:
                     twin._buffer.note(reseeded(int(twin.ticks[k]), seed), k)
         return twin
+
+    def reseeded(self, seeds: Sequence[int]) -> Self:
+        """Return the group, each of whose trials draws from another seed from here on, with the bits of such a fork.
+
+        What names the trials still has their first seeds.
+        """
+        self._world.agents.team["seed"] = self._world.drivers.seed[:] = np.array(seeds, dtype=np.uint64)
+        return self
 
     @property
     def ticks(self) -> Ints:
@@ -222,6 +242,13 @@ class Group:
         """The trials that have not ended."""
         return np.flatnonzero(self._going)
 
+    def decide(self) -> None:
+        """Write the commands of egos that others than the kernel drive; here whoever owns the group does that."""
+
+    def drive(self, ticks: int) -> None:
+        """Take each trial that has not ended up to `ticks` ticks farther, with the commands that are decided on."""
+        self.advance(ticks)
+
     def advance(self, most: int = 1) -> None:
         """Step each trial that has not ended by up to `most` ticks."""
         if len(active := self.active):
@@ -243,18 +270,26 @@ class Group:
             self.note(b, end.value, detail)
         self._going[b] = False
 
+    def fail(self, b: int, error: ControllerError) -> None:
+        """End trial b by a fault of its ego's driver."""
+        self.end(b, End(error.reason), error.detail)
+
     def note(self, b: int, kind: str, detail: str) -> None:
         """Hand an event of the ego, at the present tick of trial b, to its metrics."""
         if self._buffer is not None:
             self._buffer.note(Event(int(self.ticks[b]), kind, EGO, detail), b)
 
-    def outcomes(
-        self, trials: Sequence[int], controller: str, begin: Mapping[int, float | None] | None = None
-    ) -> list[Outcome]:
-        """Return the outcomes of trials that have ended; `begin` has their times to begin, seconds, where measured."""
+    def fresh(self, controller: str) -> list[Outcome]:
+        """Return the outcomes of the trials that have ended since the last call."""
+        ended = np.flatnonzero(~self._told & ~self._going)
+        self._told[ended] = True
+        return self.outcomes(ended.tolist(), controller)
+
+    def outcomes(self, trials: Sequence[int], controller: str) -> list[Outcome]:
+        """Return the outcomes of trials that have ended."""
         if not trials:
             return []
-        world, begin, name = self._world, begin or {}, bare_name(controller)
+        world, name = self._world, bare_name(controller)
         rows, endings = np.array(trials), [ending for b in trials if (ending := self.endings[b]) is not None]
         find_all([own for b in trials if (own := self.instances[b].problem).rules])
         margins = self.margins(rows)
@@ -268,13 +303,17 @@ class Group:
                 instance, self._rules[b], ending, ending.ticks, world.tally, b, contacts, breaches, self._seen[b],
                 hanging, margins[b], world.breach_log.entry[b],
             )  # fmt: skip
-            score = score_of(findings, name, begin.get(b))
+            score = score_of(findings, name, self._time_to_begin(b))
             if self._buffer is not None:
                 self._buffer.end(ending, b)
                 own = [sink for sink in self._buffer.sinks(b) if isinstance(sink, OwnMetrics)]
                 score = replace(score, metrics=own[0].result())
             found.append(Outcome(self.instances[b], ending, score))
         return found
+
+    def _time_to_begin(self, _b: int) -> float | None:
+        """Return how long the driver of trial b took to begin, seconds, if that was measured."""
+        return None
 
     def margins(self, trials: Ints) -> Rows[EgoMargins]:
         """Return the margins of rules 1 and 2 up to the present frames of `trials`, (B,); others' are infinite."""
@@ -366,3 +405,160 @@ class Group:
             if place.sensed:
                 self._seen[b].add((breach.car, breach.tick))
         world.work.found[0] = world.breach_log.filled[0] = 0
+
+
+def _forked(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, dt: float) -> World:
+    """Return the tables of forks of some trials (K,), which share nothing that changes with those of the group.
+
+    Breaches and contacts of the group have all been taken over. `seeds` (K,), if given, are those of the forks from
+    here on; `dt` is a tick, seconds.
+    """
+    cars = _rows_of(world.cars, trials)
+    terms = spread(world.terms, trials)
+    goals = _goals(terms)
+    seed = {} if seeds is None else {"seed": seeds}
+    progress, work = world.progress, world.work
+    state, roads, beside = (
+        _rows_of(world.state, trials), world.roads, world.beside.replace(base=world.beside.base[trials]),
+    )  # fmt: skip
+    rules, labels, memory = (
+        spread(world.rules, trials), _rows_of(world.labels, trials), _rows_of(world.memory, trials),
+    )  # fmt: skip
+    breach_log = _breach_log(world.breach_log, trials, goals)
+    spacing = _rows_of(world.spacing, trials, near=world.spacing.near.copy())
+    return World(
+        state=state,
+        cars=cars,
+        obstacles=_obstacles(world.obstacles, trials),
+        rows=rows(cars, world.state.x.shape[1], dt),
+        work=_copied(work).replace(partner=work.partner[trials], touching=work.touching[trials]),
+        roads=roads,
+        beside=beside,
+        rules=rules,
+        terms=terms,
+        labels=labels,
+        memory=memory,
+        breach_log=breach_log,
+        drivers=_rows_of(
+            world.drivers,
+            trials,
+            stage=world.drivers.stage,
+            distance=world.drivers.distance,
+            choice=world.drivers.choice,
+            **seed,
+        ),
+        scratch=_copied(world.scratch),
+        agents=_agents(world.agents, trials, seeds),
+        space=_copied(world.space),
+        tally=_tally(world.tally, trials),
+        progress=_rows_of(
+            progress,
+            trials,
+            contact=table(ContactNote, len(progress.contact)),
+            place=table(BreachPlace, len(progress.place)),
+        ),
+        spacing=spacing,
+        free=_free(world.free, trials),
+        labelling=LabelTables(state, roads, beside, rules, labels, memory),
+        judging=RefereeTables(state, roads, beside, rules, terms, labels, memory, breach_log, spacing),
+    )
+
+
+def _rows_of(table: Table, trials: Ints, **other: Any) -> Table:
+    """Return a copy of a table with the rows `trials` of each array, except for the arrays given in `other`."""
+    names = table.field_names
+    own = [other[name] if name in other else array[trials] for name, array in zip(names, table, strict=True)]
+    return type(table)(*own)
+
+
+def _gathered(begin: Ints, count: Ints) -> tuple[Ints, Ints]:
+    """Return offsets (K + 1,) and row numbers (R,) of `count` rows from `begin` on each, one after another, (K,)."""
+    ends = np.append(0, count.cumsum())
+    rows: Ints = np.arange(ends[-1], dtype=np.int64) + np.repeat(begin - ends[:-1], count)
+    return ends, rows
+
+
+def _copied(table: Table) -> Table:
+    return type(table)(*(_copied(own) if isinstance(own, Tables) else own.copy() for own in table))
+
+
+def _obstacles(table: ObstacleTable, trials: Ints) -> ObstacleTable:
+    ends, rows = _gathered(table.off[trials], np.diff(table.off)[trials])
+    return ObstacleTable(ends, table.parts[rows])
+
+
+def _goals(terms: Rows[RefereeParameters]) -> Ints:
+    """Return the rows of the forks' goals, one fork's after another's; set `goals_begin` and `goals_end` to match."""
+    begin, end = terms["goals_begin"].copy(), terms["goals_end"].copy()
+    ends, rows = _gathered(begin, end - begin)
+    terms["goals_begin"], terms["goals_end"] = ends[:-1], ends[1:]
+    return rows
+
+
+def _breach_log(log: BreachLog, trials: Ints, goals: Ints) -> BreachLog:
+    row, filled = table(FoundBreach, len(log.row)), np.zeros_like(log.filled)
+    return _rows_of(log, trials, goal=spread(log.goal, goals), look=log.look.copy(), row=row, filled=filled)
+
+
+def _tally(tally: Tally, trials: Ints) -> Tally:
+    off = np.append(tally.trial["first_goal"], len(tally.goal))
+    ends, goals = _gathered(off[trials], np.diff(off)[trials])
+    own = tally.trial[trials]
+    own["first_goal"], own["last_goal"] = ends[:-1], ends[1:]
+    names = "goal", "sample_done", "round_done", "early_done"
+    return _rows_of(tally, trials, trial=own, **{name: getattr(tally, name)[goals] for name in names})
+
+
+def _free(free: Free, trials: Ints) -> Free:
+    """Return the free cars of forks, each with a memory of its own."""
+    row = free.row[trials]
+    is_one = row >= 0
+    own = row[is_one]
+    row[is_one] = np.arange(len(own))
+    own = own if len(own) else np.zeros(1, dtype=np.int64)
+    shared = free.traffic.drivers
+    drivers = _rows_of(shared, own, stage=shared.stage, distance=shared.distance, choice=shared.choice)
+    traffic = free.traffic.replace(
+        state=_rows_of(free.traffic.state, own),
+        labels=_rows_of(free.traffic.labels, own),
+        obstacles=_obstacles(free.traffic.obstacles, own),
+        drivers=drivers,
+        scratch=_copied(free.traffic.scratch),
+    )
+    alone = free.shields.alone
+    unseen = alone.traffic.replace(
+        state=_rows_of(alone.traffic.state, own),
+        labels=_rows_of(alone.traffic.labels, own),
+        obstacles=traffic.obstacles,
+        drivers=drivers.replace(
+            car=alone.traffic.drivers.car[own],
+            way=alone.traffic.drivers.way[own],
+            command=alone.traffic.drivers.command[own],
+        ),
+        scratch=traffic.scratch,
+    )
+    beside = free.shields.obstacles.replace(base=free.shields.obstacles.base[own])
+    shields = ShieldTables(free.shields.ego[own], beside, Alone(unseen, alone.commands[own]))
+    return Free(row, free.car[own], free.whim, traffic, shields, free.commands[own])
+
+
+def _agents(agents: Agents, trials: Ints, seeds: npt.NDArray[np.uint64] | None) -> Agents:
+    """Return the e-agents of forks; each car that follows the ego or is nudged gets a memory of its own."""
+    team, cars = agents.team[trials], agents.agent[trials]
+    if seeds is not None:
+        team["seed"] = seeds
+    follows = cars["trail"] >= 0
+    trail = cars["trail"][follows]
+    cars["trail"][follows] = np.arange(len(trail))
+    nudged = cars["recall"] >= 0
+    recall = cars["recall"][nudged]
+    cars["recall"][nudged] = np.arange(len(recall))
+    return Agents(
+        team,
+        cars,
+        agents.cycle,
+        agents.script,
+        agents.trail[trail],
+        agents.point[trail],
+        agents.recalled[recall],
+    )

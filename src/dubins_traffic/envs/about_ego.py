@@ -6,8 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.envs.step_kernel import count_tick
-from dubins_traffic.envs.tables import StepTables
+from dubins_traffic.envs.step_kernel import StepTables, count_tick
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.observations.flat_kernel import near_far, sweep, within, write_bearing, write_flat

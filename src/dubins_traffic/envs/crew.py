@@ -1,10 +1,13 @@
-"""A crew: trials in which learners drive some or all cars, stepped together, with observations and costs per car."""
+"""A crew: trials in which learners drive some or all cars, stepped together, with observations and costs per car.
+
+Whose breaches count follows from who broke first. The rules are an agreement: the e-agents keep E1 to E6, and the ego
+then keeps rules 1 to 3 (docs/rules.md). Within a frame the e-agents move first, as in a verdict.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -12,26 +15,24 @@ import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
-from dubins_traffic.controllers import registry
-from dubins_traffic.controllers.registry import COMPILED
-from dubins_traffic.engine.controlled import Controlled
+from dubins_traffic.engine.egos import Egos, Way
 from dubins_traffic.engine.group import Group
 from dubins_traffic.envs.about_ego import NAMES, count_cars, tell_cars
-from dubins_traffic.envs.bank import Board
-from dubins_traffic.envs.blame import Blame
-from dubins_traffic.envs.step_kernel import begin_trials
-from dubins_traffic.envs.tables import StepTables, Stride
-from dubins_traffic.envs.terms import AT_FAULT, COSTS
+from dubins_traffic.envs.fleet import Board
+from dubins_traffic.envs.step_kernel import StepTables, Stride, begin_trials
+from dubins_traffic.envs.terms import AT_FAULT, PARTS
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
 from dubins_traffic.observations.outlook import new_outlook
 from dubins_traffic.observations.viewpoints import Viewpoints
-from dubins_traffic.problem.instance import EAgent, Instance
+from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.rules.breach_log import RULE, RULES
-from dubins_traffic.rules.referee import Breach, accused
-from dubins_traffic.scoring.verdict import ASSUMPTIONS
+from dubins_traffic.rules.exceptions import Exceptions
+from dubins_traffic.rules.parameters import RuleParameters
+from dubins_traffic.rules.referee import Breach, accused, order
+from dubins_traffic.scoring.verdict import assumed, assumption_of
 from dubins_traffic.shield.car_shields import CarShields
 
 if TYPE_CHECKING:
@@ -39,10 +40,61 @@ if TYPE_CHECKING:
     from dubins_traffic.envs.settings import Settings
     from dubins_traffic.shield.tables import Overtakes
 
+
+class Blame:
+    """Decides for the breaches of one trial, as they come, which count.
+
+    - A breach by an e-agent counts if the problem assumes the part of E1 to E6 that it breaks, if it is beyond the
+      exceptions that are allowed, and if the ego has not violated its own part in an earlier frame.
+    - A breach by the ego counts if no breach by an e-agent has counted, up to and including its frame.
+
+    All others are excused.
+
+    Parameters
+    ----------
+    problem : Problem
+        What is judged.
+    excuses : bool
+        Whether it matters who broke first; else each side answers for all that it breaks.
+
+    Attributes
+    ----------
+    first : int or None
+        The car whose breach was the first that counted; None so far.
+    """
+
+    def __init__(self, problem: Problem, *, excuses: bool = True) -> None:
+        self._excuses = excuses
+        rules = RuleParameters.from_mapping(problem.rules)
+        self._assumed = assumed(rules)
+        self._exceptions = Exceptions(rules, problem.rate)
+        self._since = -1
+        self.first: int | None = None
+
+    def of(self, breaches: Sequence[Breach]) -> list[tuple[Breach, str]]:
+        """Return the breaches since the last call that count, each with the part that it breaks.
+
+        That is ``E1`` to ``E6`` of an e-agent's, and the rule itself of the ego's.
+        """
+        found: list[tuple[Breach, str]] = []
+        for breach in sorted(breaches, key=lambda one: (one.tick, one.car == EGO, *order(one))):
+            part = breach.rule if breach.car == EGO else assumption_of(breach.rule)
+            if self._counts(breach, part):
+                found.append((breach, part))
+                if self.first is None:
+                    self.first, self._since = breach.car, breach.tick
+        return found
+
+    def _counts(self, breach: Breach, part: str) -> bool:
+        if breach.car == EGO:
+            return self.first in (None, EGO) or not self._excuses
+        allowed = part == "E1" and not self._exceptions.exceeded(breach)
+        excused = self._excuses and self.first == EGO and self._since < breach.tick
+        return part in self._assumed and not allowed and not excused
+
+
 LEARNER: Final = "learner/policy"
 """The type of an e-agent that a learner drives."""
-PARTS: Final = (*COSTS, *ASSUMPTIONS)
-"""The parts that can be broken, by number: of the ego its rules and fault, of an e-agent E1 to E6."""
 Bools = npt.NDArray[np.bool_]
 
 
@@ -59,7 +111,7 @@ class Cast:
     shields : dict
         Of cars under a shield, by number, when they may cross the centre line.
     excuses : bool
-        Whether what one side breaks after the other costs nothing (`envs.blame`).
+        Whether what one side breaks after the other costs nothing (`Blame`).
     """
 
     learned: Sequence[int]
@@ -87,7 +139,7 @@ class Crew:
     terms : (B, N, T)
         Terms of `envs.terms` of each car in the last step, but for breaches.
     broken : (B, N, P)
-        How often each car has broken each of `PARTS` in the last step, where that counts (`envs.blame`).
+        How often each car has broken each of `PARTS` in the last step, where that counts (`Blame`).
     stepped_in : (B, N)
         In how many ticks of the last step a shield has changed each car's command.
     given : list of (B, N, 2)
@@ -98,9 +150,12 @@ class Crew:
 
     def __init__(self, instances: Sequence[Instance], cast: Cast, settings: Settings) -> None:
         own = [with_learners(instance, cast.learned) for instance in instances]
-        controlled = cast.ego is not None and (cast.ego != COMPILED or settings.disturbed)
-        self._egos = Controlled(own, partial(registry.load, str(cast.ego))) if controlled else None
-        self.group = self._egos.group if self._egos else Group(own, keeps_rules=cast.ego == COMPILED)
+        if cast.ego is None:
+            self.group = Group(own, keeps_rules=False)
+        else:
+            egos = Egos(cast.ego, apart=True)
+            is_kernel = egos.is_compiled and not settings.disturbed
+            self.group = egos.group(own, Way.COMPILED if is_kernel else Way.ASKED)
         self._cars = len(instances[0].starts)
         trials, places = self.group.state.x.shape
         problems = [instance.problem for instance in instances]
@@ -158,8 +213,7 @@ class Crew:
     def _tick(self, asked: Floats) -> None:
         group, commands = self.group, self.group.commands
         commands[:, self._learned] = asked[:, self._learned]
-        if self._egos is not None:
-            self._egos.ask_each()
+        group.decide()
         running = group.active
         for shields in self._shields:
             ticks: Ints = np.full(len(group.instances), -1)

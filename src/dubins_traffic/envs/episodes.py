@@ -82,11 +82,6 @@ class Episodes:
         What they are drawn from.
     levels : Levels, optional
         The pool of road networks; by default each trial has the network that its configuration says.
-
-    Raises
-    ------
-    InputError
-        If the configuration asks for what environments do not have.
     """
 
     def __init__(self, configuration: Configuration, levels: Levels | None = None) -> None:
@@ -95,13 +90,7 @@ class Episodes:
         self._level = cache(self._drawn)
 
     def draw(self, wanted: Iterable[tuple[int, int, int]]) -> list[Instance]:
-        """Return the trials of some episodes, each given by base seed, environment and number.
-
-        Raises
-        ------
-        InputError
-            If an environment or an episode has too large a number, or a trial can't be drawn.
-        """
+        """Return the trials of some episodes, each given by base seed, environment and number."""
         numbered = [(seed, trial_of(env, episode)) for seed, env, episode in wanted]
         groups: dict[tuple[int, int], list[int]] = {}
         for place, (seed, trial) in enumerate(numbered):

@@ -15,8 +15,8 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.envs.about_ego import NAMES
 from dubins_traffic.envs.crew import Cast, Crew
 from dubins_traffic.envs.pictures import SIDE, Renderer
-from dubins_traffic.envs.roles import Pay
 from dubins_traffic.envs.settings import Settings
+from dubins_traffic.envs.terms import Pay
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.observations.flat import SHOWN
@@ -221,7 +221,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
 
     def _paid(self, crew: Crew, name: str) -> tuple[float, dict[str, Any]]:
         car = self._ids.index(name)
-        reward, told = self._pay.of(crew, 0, car)
+        reward, told = self._pay.of(crew.terms[0], crew.broken[0], car)
         first = crew.blame[0].first
         told["broke_first"] = None if first is None else self._ids[first]
         if car in self._cast.shields:

@@ -36,11 +36,6 @@ class Renderer:
         One of `MODES`; without one nothing is shown.
     width, height : int
         Pixels.
-
-    Raises
-    ------
-    InputError
-        If there is no such mode, or a side is too long or short.
     """
 
     def __init__(self, mode: str | None, width: int = SIDE, height: int = SIDE) -> None:

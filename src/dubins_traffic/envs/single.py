@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any
 import gymnasium
 import numpy as np
 
-from dubins_traffic.cars.state import Observation
-from dubins_traffic.envs import info
+from dubins_traffic.envs.channel import TrialView
 from dubins_traffic.envs.fleet import Fleet
 from dubins_traffic.envs.pictures import MODES, SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
-from dubins_traffic.envs.spaces import observed, space_of
+from dubins_traffic.envs.spaces import info_of_one, observed, space_of
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.observations.flat import SHOWN
-from dubins_traffic.observations.senses import Senses
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.shield.tables import Overtakes, check_overtakes
 
@@ -77,7 +75,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         self._seeded = False
         self._is_shielded = False
         self._interventions: int | None = None
-        self._senses: Senses | None = None
+        self._view: TrialView | None = None
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -95,7 +93,8 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         self._interventions = 0 if self._is_shielded else None
         instance = self.fleet.instance(0)
         if self.settings.observation == "object":
-            self._senses = Senses(instance)
+            bank, row = self.fleet.seat(0)
+            self._view = TrialView(bank.group, row)
         return self._observed(), {"trial": instance, **self._states()}
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, dict[str, Any]]:
@@ -104,7 +103,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
             raise DubinsTrafficError("the episode is over, or has not begun: reset the environment")
         self.fleet.step([action])
         board = self.fleet.board.arrays
-        told = info.of_one(board["terms"][0], board["weighted"][0]) | self._states() | self._stepped_in()
+        told = info_of_one(board["terms"][0], board["weighted"][0]) | self._states() | self._stepped_in()
         ended, terminated = bool(self.fleet.ended[0]), False
         if ended:
             terminated = self.fleet.is_terminal(0)
@@ -165,14 +164,10 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         return {"formulas": self.fleet.states(0)} if self.settings.formulas else {}
 
     def _observed(self) -> Any:
-        if self._senses is None:
+        if self._view is None:
             return observed(
                 self.settings.observation, self.settings.layout, self.fleet.board.arrays["flat"][0]
             )
-        return self._sensed(self._senses)
-
-    def _sensed(self, senses: Senses) -> Observation:
-        """Return what a controller would be told, with the scan that the laser has made in between."""
+        found = self._view.observe()  # its scan is the one that the laser has made in between
         bank, row = self.fleet.seat(0)
-        found = senses.observe(self.fleet.tick(0), *bank.group.of_trial(row))
         return found if found.scan is None else found._replace(scan=bank.outlook.ranges[row].copy())

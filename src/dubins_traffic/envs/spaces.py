@@ -1,4 +1,4 @@
-"""Spaces of observations, and observations in them."""
+"""Spaces of observations, observations in them, and the info of steps: terms of the reward, and costs by rule."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ import numpy as np
 from gymnasium import spaces
 
 from dubins_traffic.cars.state import Observation
+from dubins_traffic.envs.terms import COSTS, TERM, TERMS
+from dubins_traffic.kernels.arrays import Floats
 
 if TYPE_CHECKING:
     import numpy.typing as npt
@@ -53,3 +55,42 @@ def observed(kind: str, layout: Layout, flat: npt.NDArray[np.float32]) -> Any:
 
 def _box(size: int) -> spaces.Box:
     return spaces.Box(-1.0, 1.0, (size,), np.float32)
+
+
+_TERMS = np.dtype([(name, np.float64) for name in TERMS])
+_COSTS = np.dtype([(name, np.float64) for name in COSTS])
+
+
+def info_of_one(terms: Floats, weighted: Floats) -> dict[str, Any]:
+    """Return the info of a step of one environment, whose terms, (T,), are given without and with weights."""
+    return {
+        "reward_terms": dict(zip(TERMS, weighted.tolist(), strict=True)),
+        "cost": dict(zip(COSTS, terms[TERM.BREACHES :].tolist(), strict=True)),
+    }
+
+
+class StepInfo:
+    """Makes the info of steps of all environments.
+
+    Parameters
+    ----------
+    envs : int
+        How many there are.
+    """
+
+    def __init__(self, envs: int) -> None:
+        everyone = np.ones(envs, dtype=np.bool_)
+        everyone.flags.writeable = False
+        self._masks = {"_reward_terms": everyone, "_cost": everyone}
+
+    def of_all(self, terms: Floats, weighted: Floats) -> dict[str, Any]:
+        """Return the info of a step, whose terms, (E, T), are given without and with weights.
+
+        Of `reward_terms` and `cost` each is an array (E,) of rows whose fields have the names of the terms, so that
+        ``info["cost"]["2.left"]`` is (E,).
+        """
+        return {
+            "reward_terms": weighted.copy().view(_TERMS)[:, 0],
+            "cost": terms[:, TERM.BREACHES :].copy().view(_COSTS)[:, 0],
+            **self._masks,
+        }

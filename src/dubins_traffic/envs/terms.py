@@ -1,20 +1,27 @@
-"""The terms of rewards, with weights, and costs by rule."""
+"""The reward of each car in a step: its terms and their weights by role, and costs by rule.
+
+The ego's terms are counted, and those of environments of one ego summed up, by `envs.step_kernel`; e-agents are
+adversaries, which spoil the ego's task, or peers with tasks of their own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from dubins_traffic.cars.state import EGO
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.rules import breach_log
-from dubins_traffic.scoring.verdict import EGO_RULES
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
 
 COSTS: Final = (*EGO_RULES, "at_fault")
 """Costs, by number: breaches of each rule of the ego's, and its collisions at fault."""
 AT_FAULT: Final = len(COSTS) - 1
+PARTS: Final = (*COSTS, *ASSUMPTIONS)
+"""The parts that can be broken, by number: of the ego its rules and fault, of an e-agent E1 to E6."""
 
 
 class _Term(NamedTuple):
@@ -56,18 +63,94 @@ def costs_of_rules() -> Ints:
 
 
 def weights_of(given: Mapping[str, float] | None) -> Floats:
-    """Return the weight of each term, (T,), where `given` names those that are not as in `WEIGHTS`.
+    """Return the weight of each term of the ego's, (T,), where `given` names those that are not as in `WEIGHTS`."""
+    return np.array(list(_weighted(WEIGHTS, given or {}, "reward").values()))
 
-    Raises
-    ------
-    InputError
-        If there is no such term, or a weight is no finite number.
-    """
-    own = dict(WEIGHTS)
-    for name, value in (given or {}).items():
+
+def _weighted(usual: Mapping[str, float], given: Mapping[str, float], field: str) -> dict[str, float]:
+    """Return the weights by term, in the order of `usual`; `field` names what is given."""
+    own = dict(usual)
+    for name, value in given.items():
         if name not in own:
-            raise InputError("no such term", field="reward", value=name, expected=", ".join(TERMS))
+            raise InputError("no such term", field=field, value=name, expected=", ".join(usual))
         if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):  # pyright: ignore[reportUnnecessaryIsInstance]
-            raise InputError("not a weight", field=f"reward.{name}", value=value, expected="a finite number")
+            raise InputError("not a weight", field=f"{field}.{name}", value=value, expected="a finite number")
         own[name] = float(value)
-    return np.array([own[name] for name in TERMS])
+    return own
+
+
+ADVERSARY: Final[Mapping[str, float]] = {
+    "spoiled": 1.0,
+    "violated": 1.0,
+    "comfort": 0.0,
+    "time": 0.0,
+    **dict.fromkeys(ASSUMPTIONS, -1.0),
+    "E2": -5.0,
+}
+"""Default weights of the terms of an adversary's reward.
+
+`spoiled`: what the ego's visits, rounds and progress count for it, with the sign turned; `violated`: breaches of the
+ego's that count; and its own breaches that count, by the part of the assumption.
+"""
+PEER: Final[Mapping[str, float]] = {
+    **{name: WEIGHTS[name] for name in TERMS[: TERM.BREACHES]},
+    **dict.fromkeys(ASSUMPTIONS, -1.0),
+    "E2": -5.0,
+}
+"""Default weights of the terms of a peer's reward; a peer goes round the goals as the ego does."""
+ROLES: Final[Mapping[str, Mapping[str, float]]] = {"adversaries": ADVERSARY, "peers": PEER}
+"""The roles of e-agents."""
+_FIRST: Final = len(COSTS)
+"""The first of `PARTS` that an e-agent may break."""
+
+
+class Pay:
+    """Computes the reward of each car of a crew in a step.
+
+    Parameters
+    ----------
+    role : str
+        What e-agents are: ``adversaries`` or ``peers``.
+    reward : mapping, optional
+        Weights of terms that are not as usual: under ``ego`` those of the ego, under ``others`` those of e-agents.
+    """
+
+    def __init__(self, role: str, reward: Mapping[str, Mapping[str, float]] | None = None) -> None:
+        if role not in ROLES:
+            raise InputError("no such role", field="roles", value=role, expected=" or ".join(ROLES))
+        given = dict(reward or {})
+        unknown = given.keys() - {"ego", "others"}
+        if unknown:
+            raise InputError("not rewards", field="reward", value=sorted(unknown)[0], expected="ego, others")
+        self._ego = weights_of(given.get("ego"))
+        self._others = _weighted(ROLES[role], given.get("others", {}), "reward.others")
+        self._spoils = role == "adversaries"
+
+    def of(self, terms: Floats, broken: Ints, car: int) -> tuple[float, dict[str, Any]]:
+        """Return the reward of a car in the last step of its trial, and what it says of it: its terms, and costs.
+
+        Parameters
+        ----------
+        terms : (N, T)
+            The terms of each car, but for breaches.
+        broken : (N, P)
+            How often each car has broken each of `PARTS`, where that counts.
+        car : int
+            The number of the car.
+        """
+        if car == EGO:
+            costly: Floats = broken[EGO, :_FIRST].astype(np.float64)
+            own = np.concatenate([terms[EGO, : TERM.BREACHES], costly])
+            weighted: list[float] = (own * self._ego).tolist()
+            costs = dict(zip(COSTS, costly.tolist(), strict=True))
+            return sum(weighted), {"reward_terms": dict(zip(TERMS, weighted, strict=True)), "cost": costs}
+        parts = dict(zip(ASSUMPTIONS, map(float, broken[car, _FIRST:]), strict=True))
+        done: dict[str, float] = dict(
+            zip(TERMS[: TERM.BREACHES], terms[car, : TERM.BREACHES].tolist(), strict=True)
+        )
+        if self._spoils:
+            task = (TERM.VISITS, TERM.ROUNDS, TERM.PROGRESS)
+            done["spoiled"] = -float(sum(terms[EGO, k] * self._ego[k] for k in task))
+            done["violated"] = float(broken[EGO, :AT_FAULT].sum())
+        found = {name: weight * {**done, **parts}[name] for name, weight in self._others.items()}
+        return sum(found.values()), {"reward_terms": found, "cost": parts}

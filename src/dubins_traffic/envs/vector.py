@@ -13,10 +13,9 @@ from gymnasium.vector.utils import batch_space
 
 from dubins_traffic.envs.episodes import seeds_of
 from dubins_traffic.envs.fleet import Fleet, masked
-from dubins_traffic.envs.info import StepInfo
 from dubins_traffic.envs.pictures import MODES, SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
-from dubins_traffic.envs.spaces import observed, space_of
+from dubins_traffic.envs.spaces import StepInfo, observed, space_of
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.observations.flat import SHOWN
 

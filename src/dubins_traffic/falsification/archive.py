@@ -1,19 +1,131 @@
-"""The folder of a search: one case for each kind of failure, what the search has done, and where it goes on."""
+"""The folder of a search: one case for each kind of failure, what the search has done, and where it goes on.
+
+Its journal has the trials that are finished since the search last wrote that down, so that none of them is run again;
+its page tells what was found and loads nothing from elsewhere.
+"""
 
 from __future__ import annotations
 
 import contextlib
 import hashlib
 import json
-from collections.abc import Container, Generator, Iterator, Mapping
+import os
+import time
+import zlib
+from collections.abc import Container, Generator, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
+from dubins_traffic.campaign.chunks import KEPT_S
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.case import Case, read_case
-from dubins_traffic.falsification.journal import Journal
-from dubins_traffic.files import locked, make_folder, read_text, write_text
+from dubins_traffic.falsification.coverage import Row
+from dubins_traffic.falsification.trying import Tried
+from dubins_traffic.files import locked, make_folder, read_bytes, read_text, write_text
 from dubins_traffic.problem.files import parse_json
+from dubins_traffic.viewer.pages import render
+
+if TYPE_CHECKING:
+    from dubins_traffic.falsification.moves import Genome
+
+
+Key = tuple[int, str]
+"""The number of a trial, and the hash of its genome."""
+Finished = tuple[int, "Genome", Tried]
+"""The number of a trial, its genome, and what came of it."""
+
+
+class Journal:
+    """What came of the trials that are finished and not yet part of the state of a search, a line each.
+
+    A trial is known by its number and the hash of its genome: another one of that number is run. A line begins with its
+    checksum; what is not as it was written, such as a last line that was cut off, is passed over, and its trial run.
+
+    Parameters
+    ----------
+    path : Path
+        The file, which need not be there.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        self._lines: dict[Key, str] = {}
+        self._waiting: list[Finished] = []
+        self._written = time.monotonic()
+        told = read_bytes(path).decode(errors="replace").splitlines(keepends=True) if path.is_file() else []
+        for line in told:
+            checksum, _, text = line.partition(" ")
+            if checksum == _checksum(text):
+                number, digest, _ = json.loads(text)
+                self._lines[number, digest] = line
+        self._sound = 0 < len(self._lines) == len(told)
+
+    def known(self, number: int, genome: Genome) -> Tried | None:
+        """Return what came of a trial; None if it is not here."""
+        line = self._lines.get(_key(number, genome)) if self._lines else None
+        return None if line is None else Tried.from_json(json.loads(line.partition(" ")[2])[2])
+
+    def keep(self, finished: Iterable[Finished]) -> None:
+        """Keep trials that are finished: at once if the last were written `KEPT_S` ago, else with the next ones."""
+        self._waiting += finished
+        if time.monotonic() - self._written > KEPT_S:
+            self._append()
+
+    def taken(self) -> None:
+        """A generation has been taken over: what of it is not written yet is left to the state that is written next."""
+        self._waiting.clear()
+        self._written = time.monotonic()
+
+    def settle(self, trials: int) -> None:
+        """Forget the first `trials` trials, which the state knows, and write down all others."""
+        self._take_lines()
+        self._lines = {key: line for key, line in self._lines.items() if key[0] >= trials}
+        self._write()
+
+    def _take_lines(self) -> str:
+        """Return the lines of what waits, which are lines like the others from now on."""
+        lines: list[str] = []
+        for number, genome, tried in self._waiting:
+            key = _key(number, genome)
+            text = json.dumps([*key, tried.to_json()]) + "\n"
+            self._lines[key] = line = f"{_checksum(text)} {text}"
+            lines.append(line)
+        self._waiting.clear()
+        return "".join(lines)
+
+    def _append(self) -> None:
+        """Write what waits behind the lines that are there, if all are as they were written."""
+        lines = self._take_lines()
+        if not self._sound:
+            self._write()
+            return
+        try:
+            with self._path.open("ab") as file:
+                file.write(lines.encode())
+                file.flush()
+                os.fsync(file.fileno())
+        except OSError as error:
+            raise InputError(f"can't be written ({error.strerror})", file=str(self._path)) from error
+        self._written = time.monotonic()
+
+    def _write(self) -> None:
+        """Write all lines anew."""
+        if self._lines:
+            write_text(self._path, "".join(self._lines.values()), durable=True)
+        else:
+            self._path.unlink(missing_ok=True)
+        self._sound = bool(self._lines)
+        self._written = time.monotonic()
+
+
+def _checksum(text: str) -> str:
+    return f"{zlib.crc32(text.encode()):08x}"
+
+
+def _key(number: int, genome: Genome) -> Key:
+    return number, hashlib.sha256(json.dumps(genome.to_json()).encode()).hexdigest()
+
 
 CASES: Final = "cases"
 """The folder of the cases."""
@@ -103,11 +215,6 @@ def opened(folder: Path, settings: Any, *, resume: bool) -> Generator[Archive]:
         What is searched; a search that is resumed must have the same.
     resume : bool
         Whether to go on with what has been begun there; otherwise the folder must be new or empty.
-
-    Raises
-    ------
-    InputError
-        If the folder holds something else, another search, is in use or can't be written.
     """
     make_folder(folder, "a search", begun=resume)
     make_folder(folder / CASES, "a search")
@@ -128,3 +235,98 @@ def opened(folder: Path, settings: Any, *, resume: bool) -> Generator[Archive]:
                 expected="the same settings",
             )
         yield archive
+
+
+COUNTS: Final = {
+    "trials": "trials",
+    "violated": "in which the ego broke what was asked for",
+    "discarded": "discarded, since the assumption fell before",
+    "faulty": "ended by a fault",
+    "unconfirmed": "breaches that did not come again",
+}
+"""The counts of a search (`coverage.Counts`), and what the page calls them."""
+
+
+def coverage_page(
+    settings: Mapping[str, Any],
+    counts: Mapping[str, int],
+    rows: Sequence[Row],
+    cases: Mapping[str, Case],
+    found_in: Mapping[str, int],
+) -> str:
+    """Return the page of a search; equal arguments give equal text.
+
+    Parameters
+    ----------
+    settings : mapping
+        What tells the search from others: `controller`, `targets`, `seed`, `strategy`.
+    counts : mapping
+        What became of its trials, by the keys of `COUNTS`.
+    rows : sequence of Row
+        The coverage.
+    cases : mapping
+        What was found, by the names of the files.
+    found_in : mapping
+        For some of these the number of the trial in which each was found, from 0.
+    """
+    lines: dict[str, dict[str, dict[int, Row]]] = {}
+    for row in rows:
+        manoeuvres = lines.setdefault(row.cell.rule, {})
+        manoeuvres.setdefault(row.cell.manoeuvre.name.lower(), {})[row.cell.degree] = row
+    made = [("asked for", ", ".join(settings["targets"]))]
+    made += [(name, settings[name]) for name in ("controller", "strategy", "seed")]
+    return render(
+        "falsification/coverage.html",
+        title=f"Coverage of a search: {settings['controller']}",
+        told=f"{counts['trials']:,} trials, {len(cases)} kinds of failure.",
+        cells=len(rows),
+        never=[_name(row) for row in rows if row.empty],
+        lines=lines,
+        roads={degree: _roads(degree) for degree in sorted({row.cell.degree for row in rows})},
+        cases=cases,
+        folder=CASES,
+        found_in=found_in,
+        made=[*made, *((words, f"{counts[name]:,}") for name, words in COUNTS.items())],
+    )
+
+
+def _name(row: Row) -> str:
+    return f"{row.cell.rule} {row.cell.manoeuvre.name.lower()}, {_roads(row.cell.degree)}"
+
+
+def _roads(degree: int) -> str:
+    return f"{degree} road{'s' if degree != 1 else ''}" if degree else "no crossing known"
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """What a search leaves.
+
+    Attributes
+    ----------
+    folder : Path
+        Its folder.
+    cases : dict of str to Case
+        One case for each kind of failure, by the name of its cell.
+    trials, discarded, faulty, violated : int
+        How many trials it has run; of these, in how many the assumption was broken first, how many ended by a fault,
+        and in how many the ego broke a rule that was asked for.
+    coverage : list of Row
+        Which rule, manoeuvre and crossing were put to the test.
+    fault : str
+        How many trials ended by which fault, and why the first; empty if none did.
+    """
+
+    folder: Path
+    cases: Mapping[str, Case]
+    trials: int
+    discarded: int
+    faulty: int
+    violated: int
+    coverage: list[Row]
+    fault: str = ""
+
+    @property
+    def page(self) -> Path:
+        """The page with the coverage and what was found."""
+        return self.folder / PAGE

@@ -1,22 +1,47 @@
-"""A case: an instance in which an ego breaks a rule, with what is known of it, as one small file that `run` replays."""
+"""A case: an instance in which an ego breaks a rule, judged afresh, as a file that `run` replays, and its page."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
+import tempfile
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast, get_type_hints
 
+from dubins_traffic.cars.state import EGO
+from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.errors import InputError
+from dubins_traffic.falsification import contract
+from dubins_traffic.falsification.contract import first_overdue, limit_of, spare
 from dubins_traffic.falsification.coverage import Cell, Manoeuvre
+from dubins_traffic.falsification.remote import Remote
+from dubins_traffic.falsification.trying import (
+    Tried,
+    broken_formulas,
+    driver_of,
+    judged_record,
+    name_of,
+    tried_of,
+)
 from dubins_traffic.files import require_output, write_text
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.files import DOCUMENTS, parse_json, read_source
+from dubins_traffic.record.reader import Record, read
+from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.runs.single import run_trial
+from dubins_traffic.scoring.margins import LIVENESS
+from dubins_traffic.scoring.score import Score
+from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Place, Ruling, Violation
+from dubins_traffic.viewer.replay import write_replay
 
 if TYPE_CHECKING:
+    from dubins_traffic.engine.controlled import Maker
+    from dubins_traffic.falsification.coverage import Cell
     from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.protocols import Controller
+
 
 KEY: Final = "case"
 """The key of an instance's document under which a case says what it is; a run passes it over."""
@@ -67,13 +92,7 @@ class Case:
 
 
 def read_case(path: str | os.PathLike[str]) -> Case:
-    """Return the case in a file.
-
-    Raises
-    ------
-    InputError
-        If there is no such file, or it holds no case.
-    """
+    """Return the case in a file."""
     name = os.fspath(path)
     document = parse_json(read_source(name).text, name)
     return case_of(instance_from_document(document, name), name)
@@ -105,3 +124,225 @@ def _check_kinds(story: Story, file: str | None) -> None:
             raise InputError(
                 "of the wrong kind", file=file, field=f"{KEY}.{name}", value=value, expected=kind.__name__
             )
+
+
+def sentence_of(record: Record, score: Score, breach: Violation) -> str:
+    """Return who did what when in a trial in which the ego broke a rule.
+
+    Parameters
+    ----------
+    record, score
+        The trial, up to the breach or farther.
+    breach
+        The ego's.
+    """
+    when = f"At {breach.time:.2f} s the ego"
+    match breach.rule:
+        case "1.collision":
+            return f"{when} {_collision(record, score, breach)}."
+        case "1.road":
+            return f"{when} left the road near ({breach.where.x:.1f}, {breach.where.y:.1f}) m."
+        case "2.left":
+            return f"{when} crossed the centre line of {_road(breach)} though nothing stood in its lane."
+        case "2.return":
+            since = f"as it had been since {breach.since:.2f} s"
+            return f"{when} was still left of the centre line of {_road(breach)}, {since}."
+        case "2.turn":
+            return f"{when} turned round on {_road(breach)}."
+        case rule if rule in contract.CONTRACT:
+            return contract.sentence_of(score.verdict, breach)
+        case "1.goal":
+            since = f"since {breach.since:.2f} s" if breach.since > 0.0 else "yet"
+            return f"{when} had not visited the goal {_crossing(breach)} {since}, which is longer than a gap may be."
+        case rule if rule.startswith("formula "):
+            place = f"({breach.where.x:.1f}, {breach.where.y:.1f}) m"
+            return f"At {breach.time:.2f} s the formula became false, the ego being at {place}."
+        case "3.stop" | "3.order" | "3.clear":
+            return f"{when} entered the crossing at {_crossing(breach)} {_entry(record, breach)}."
+        case rule:
+            return f"{when} broke {rule} near ({breach.where.x:.1f}, {breach.where.y:.1f}) m."
+
+
+def _collision(record: Record, score: Score, breach: Violation) -> str:
+    hits = [own for own in score.collisions if abs(own.time - breach.time) <= 1.5 / record.frames.rate]
+    other = hits[0].partner if hits else "something"
+    place = f"at {_crossing(breach)}" if breach.where.intersection else f"on {_road(breach)}"
+    speed = float(record.frames.speed[max(0, breach.tick - 1), EGO])
+    how = "standing" if abs(speed) < 0.01 else f"driving at {speed:.2f} m/s"
+    return f"touched {other} {place}, {how}"
+
+
+def _entry(record: Record, breach: Violation) -> str:
+    before = max(0, breach.tick - 1)
+    bits, crosses = record.frames.bits[before], record.frames.crosses[before]
+    names = record.instance.names
+    if breach.rule == "3.stop":
+        return "without having stopped at its line"
+    vertex = _vertex(record, breach)
+    if breach.rule == "3.clear":
+        inside = [names[n] for n in range(1, len(names)) if crosses[n] == vertex]
+        return f"while {' and '.join(inside) or 'another car'} was in it"
+    waiting = [
+        names[n]
+        for n in range(1, len(names))
+        if bits[n] & FLAG.STOPPED and _heads(record, n, before) == vertex
+    ]
+    return f"before its turn, while {' and '.join(waiting) or 'another car'} waited there"
+
+
+def _heads(record: Record, car: int, frame: int) -> int:
+    """Return the intersection at the end of a car's lane, -1 without lane state."""
+    lane = int(record.frames.lane[frame, car])
+    return -1 if lane < 0 else record.instance.problem.network.lane_ends(lane)[1]
+
+
+def _vertex(record: Record, breach: Violation) -> int:
+    where = breach.where.intersection
+    return -1 if where is None else record.instance.problem.network.vertex(where)
+
+
+def _crossing(breach: Violation) -> str:
+    where = breach.where.intersection
+    return "its place" if where is None else f"({where[0]}, {where[1]})"
+
+
+def _road(breach: Violation) -> str:
+    own = breach.where.segment
+    return "its road" if own is None else f"the road from ({own[0]}, {own[1]}) to ({own[2]}, {own[3]})"
+
+
+Make = Callable[[], "Controller"] | Remote
+"""What makes the controller, or drives trials elsewhere."""
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """What the judge has said of a record: the record, its score, and what a search keeps of it."""
+
+    record: Record
+    score: Score
+    tried: Tried
+
+    def breach(self, rule: str) -> Violation | None:
+        """Return the ego's first breach of a rule if the trial is `violated` and all keep E1 to E6, else None.
+
+        Of `contract.CONTRACT` that of the car that is concerned.
+        """
+        verdict = self.score.verdict
+        if rule in contract.CONTRACT:
+            return self.first(rule)
+        if verdict is None or verdict.assumption_broken:
+            return None
+        if rule not in EGO_RULES:
+            return self.first(rule)
+        return self.first(rule) if verdict.verdict is Ruling.VIOLATED else None
+
+    def first(self, rule: str) -> Violation | None:
+        """Return the ego's first breach of a rule, formula or goal (`liveness`), whatever others did."""
+        verdict, frames = self.score.verdict, self.record.frames
+        if rule == LIVENESS:
+            return self._overdue()
+        if rule in contract.CONTRACT:
+            ticks = [tick for cell, tick in self.tried.cells if cell.rule == rule]
+            return contract.breach_of(rule, ticks[0], verdict, self.record) if verdict and ticks else None
+        own = () if verdict is None else verdict.violations
+        for broken in own:
+            if broken.car == EGO_NAME and broken.rule == rule:
+                return broken
+        time = broken_formulas(self.score).get(rule)
+        if time is None:
+            return None
+        tick = round(time * frames.rate)
+        place = Place(float(frames.x[tick, EGO]), float(frames.y[tick, EGO]), None, None)
+        return Violation(rule, EGO_NAME, time, tick, time, place)
+
+    def _overdue(self) -> Violation | None:
+        """Return where the ego was when a goal had not been visited for too long."""
+        verdict, frames, problem = self.score.verdict, self.record.frames, self.record.instance.problem
+        late = None if verdict is None else spare(problem, verdict, self.record.ending)
+        limit = limit_of(problem)
+        if limit is None or late is None or late >= 0.0:
+            return None
+        found = first_overdue(self.record, limit)
+        if found is None:
+            return None
+        x, y = float(frames.x[found.tick, EGO]), float(frames.y[found.tick, EGO])
+        times = found.tick / frames.rate, found.tick, found.since / frames.rate
+        return Violation(LIVENESS, EGO_NAME, *times, Place(x, y, found.goal, None))
+
+
+def judge(instance: Instance, make: Make, name: str) -> Judged:
+    """Return what the judge says of a trial that has been written, read and run anew.
+
+    Parameters
+    ----------
+    instance : Instance
+        What is run; it goes through its document first.
+    make : callable or Remote
+        Makes the controller, which is called `name`; or drives the trial.
+    """
+    document = json.loads(json.dumps(instance_to_document(instance)))
+    again = instance_from_document(document)
+    record = make.drive(again) if isinstance(make, Remote) else _recorded(again, make, name)
+    found, passages = judged_record(record)
+    return Judged(record, found, tried_of(found, record.ending, passages, 0, record.instance))
+
+
+def _recorded(instance: Instance, make: Maker, name: str) -> Record:
+    """Return the record of a trial that is run here."""
+    with tempfile.TemporaryDirectory(prefix="dubins-traffic-") as folder:
+        path = Path(folder) / "trial.mcap"
+        run_trial(instance, controllers.made(make), record=path, name=name, sketch=False)
+        return replace(read(path), wall=None, file=None)
+
+
+def cut_to(instance: Instance, tick: int) -> Instance:
+    """Return an instance whose trial ends with frame `tick`."""
+    return replace(instance, duration=max(1, tick) / instance.problem.rate)
+
+
+def confirm(instance: Instance, rule: str, make: Make, name: str) -> Judged | None:
+    """Return what the judge says of an instance that is cut to the ego's breach of a rule; None if none stands."""
+    first = judge(instance, make, name)
+    breach = first.first(rule)
+    if breach is None:
+        return None
+    found = judge(cut_to(instance, breach.tick), make, name)
+    return found if found.breach(rule) is not None else None
+
+
+def case_in(instance: Instance, cell: Cell, make: Make, name: str) -> Case | None:
+    """Return an instance as a case of the ego's failure in a cell, judged afresh; None if it does not stand."""
+    found = confirm(instance, cell.rule, make, name)
+    breach = None if found is None else found.breach(cell.rule)
+    if found is None or breach is None:
+        return None
+    story = Story(
+        cell.rule, cell.manoeuvre.name.lower(), cell.degree, name, breach.time, breach.tick,
+        sentence_of(found.record, found.score, breach),
+    )  # fmt: skip
+    return Case(found.record.instance, story)
+
+
+def write_page(
+    case: Case,
+    path: str | os.PathLike[str],
+    controller: str | Remote | None = None,
+    *,
+    overwrite: bool = False,
+) -> None:
+    """Write the page that replays a case, driven by its controller or another; equal cases give equal bytes."""
+    driver = case.story.controller if controller is None else controller
+    name = name_of(driver)
+    judged = judge(case.instance, driver_of(driver), name)
+    record, verdict = judged.record, judged.score.verdict
+    own = [] if verdict is None else [broken.rule for broken in verdict.violations if broken.car == EGO_NAME]
+    summary = {
+        "rule": case.story.rule,
+        "what happens": case.story.sentence,
+        "controller": name,
+        "broken by the ego": ", ".join(dict.fromkeys(own)) or "nothing",
+    }
+    write_replay(
+        path, record.instance, record.frames, record.ending, summary, (), verdict, overwrite=overwrite
+    )

@@ -15,7 +15,6 @@ from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.scoring.verdict import EGO_RULES
 
 if TYPE_CHECKING:
-    from dubins_traffic.kernels.arrays import Ints
     from dubins_traffic.problem.instance import Instance
 
 

@@ -21,13 +21,11 @@ from dubins_traffic.campaign.report.statistics import (
 from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
-from dubins_traffic.falsification.companies import beginner
+from dubins_traffic.falsification.contract import TARGETS
 from dubins_traffic.falsification.coverage import Counts
-from dubins_traffic.falsification.crew import Crew, crew_of, maker
-from dubins_traffic.falsification.liveness import TARGETS
 from dubins_traffic.falsification.sampling import STREAM, prepared
-from dubins_traffic.falsification.splitting import Begin, Split, split
-from dubins_traffic.falsification.trying import in_order
+from dubins_traffic.falsification.splitting import Begin, Split, beginner, split
+from dubins_traffic.falsification.trying import Crew, crew_of, in_order
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many
 
@@ -157,7 +155,7 @@ class Probability:
     probability : float
         The estimate.
     interval : (float, float)
-        Its 95 % interval: Clopper and Pearson's, or that of independent runs (`replicas.Replicas`).
+        Its 95 % interval: Clopper and Pearson's, or that of independent runs (`Replicas`).
     wilson : (float, float) or None
         Wilson's interval, of Monte Carlo.
     trials, events, discarded : int
@@ -268,7 +266,7 @@ def estimate(
     name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
     told = progress or _silent
     if method == "splitting":
-        begin = beginner(maker(controller), name, event)
+        begin = beginner(controller, event)
         return by_splitting(drawn(own, seed), begin, event, below, particles, runs, seed, told)
     count = trials or 10_000
     with crew_of(controller, name, workers, None) as crew:

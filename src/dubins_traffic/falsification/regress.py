@@ -12,10 +12,9 @@ from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification.archive import files
-from dubins_traffic.falsification.case import Case, read_case
-from dubins_traffic.falsification.crew import driver_of, name_of
-from dubins_traffic.falsification.judging import judge, sentence_of
+from dubins_traffic.falsification.case import Case, judge, read_case, sentence_of
 from dubins_traffic.falsification.remote import Remote
+from dubins_traffic.falsification.trying import driver_of, name_of
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Ruling
 

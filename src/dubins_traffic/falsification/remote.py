@@ -38,13 +38,7 @@ class Reach:
 
     @staticmethod
     def from_text(text: str) -> Reach:
-        """Return what a text says: a transport, and its options, as ``lines,port=7411`` or ``ros1,master,deadline=30``.
-
-        Raises
-        ------
-        InputError
-            If there is no such transport or option, or its value is none.
-        """
+        """Return what a text says: a transport and its options, as ``lines,port=7411``, ``ros1,master,deadline=30``."""
         name, *rest = text.split(",")
         if name not in TRANSPORTS:
             expected = f"one of {', '.join(TRANSPORTS)}, and its options"

@@ -13,7 +13,7 @@ import numpy as np
 from dubins_traffic.agents import choices, whims
 from dubins_traffic.falsification import moves
 from dubins_traffic.falsification.contract import CAPRICIOUS
-from dubins_traffic.falsification.genome import Genome
+from dubins_traffic.falsification.moves import Genome
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.problem.instance import EAgent

@@ -6,9 +6,11 @@ import hashlib
 import json
 import os
 import time
+from bisect import insort
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
@@ -16,24 +18,123 @@ from dubins_traffic.controllers.registry import COMPILED
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import InputError
 from dubins_traffic.falsification import archive as archives
-from dubins_traffic.falsification.archive import Archive
-from dubins_traffic.falsification.case import Case
-from dubins_traffic.falsification.contract import PROVOKED
+from dubins_traffic.falsification.archive import Archive, Found, coverage_page
+from dubins_traffic.falsification.case import Case, Story, case_in, judge
+from dubins_traffic.falsification.contract import (
+    BLOCKED,
+    CONTRACT,
+    PROVOKED,
+    TARGETS,
+    check_lawful,
+    check_long_enough,
+)
 from dubins_traffic.falsification.coverage import Cell, Counts, Row, coverage, possible
-from dubins_traffic.falsification.crew import Crew, crew_of, name_of
-from dubins_traffic.falsification.found import Found, coverage_page
-from dubins_traffic.falsification.genome import Genome
-from dubins_traffic.falsification.judging import case_in
-from dubins_traffic.falsification.least import Least
+from dubins_traffic.falsification.moves import Genome
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.sampling import DURATION, Source, prepared
 from dubins_traffic.falsification.strategies import Strategy, make
-from dubins_traffic.falsification.targets import ASKED, check_targets, targets_of
-from dubins_traffic.falsification.trying import DONE, Tried
+from dubins_traffic.falsification.trying import DONE, FORMULA, Crew, Tried, crew_of, name_of
+from dubins_traffic.logic.formula import propositions
+from dubins_traffic.logic.monitor import Monitors
+from dubins_traffic.logic.parse import parse
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.scoring.margins import LIVENESS
 from dubins_traffic.scoring.verdict import EGO_RULES
 from dubins_traffic.trial.interrupts import WHOLE, heard_between_frames
+
+if TYPE_CHECKING:
+    from dubins_traffic.scoring.score import Score
+
+
+ASKED: Final = "asked"
+"""The name by which a problem carries the formula that a search asks for."""
+LOOKED_AT: Final = 8
+"""As many trials are looked at to see whether what is asked for can be broken."""
+
+
+def targets_of(rules: Sequence[str], formula: str | None, *, least_score: bool) -> tuple[str, ...]:
+    """Return what is asked for, by the names of margins (`trying.Tried`); the parameters are those of `falsify`."""
+    unknown = [rule for rule in rules if rule not in TARGETS]
+    if unknown:
+        expected = f"one of {', '.join(TARGETS)}"
+        raise InputError("no rule of the ego's", file="--rule", value=unknown[0], expected=expected)
+    if least_score:
+        return (DONE,)
+    if formula is not None:
+        return (f"{FORMULA} {ASKED}",)
+    return tuple(rules) or EGO_RULES
+
+
+def check_targets(targets: Sequence[str], source: Source) -> None:
+    """Refuse what no trial of a source can break."""
+    if not {LIVENESS, *CONTRACT, f"{FORMULA} {ASKED}"}.intersection(targets):
+        return
+    instances = source.draw(range(LOOKED_AT))
+    for target in {LIVENESS, BLOCKED}.intersection(targets):
+        check_long_enough(instances, target)
+    if PROVOKED in targets:
+        check_lawful(instances)
+    problem = instances[0].problem
+    for name, text in problem.formulas.items():
+        formula = parse(text)
+        if not Monitors({name: formula}, propositions(formula), problem.period).breakable:
+            raise InputError(
+                "no trial of any length can break it", file="--formula", value=text,
+                expected="a bound, as in []<>[0,60] ego_t_1_1; --rule 1.goal asks for the goals",
+            )  # fmt: skip
+
+
+MOST: Final = 5
+"""So many trials are kept."""
+
+
+@dataclass(order=True, slots=True)
+class _Kept:
+    done: float
+    number: int
+    genome: Genome = field(compare=False)
+
+
+class Least:
+    """The `MOST` trials of a search in which the ego got least done while all others kept the assumption."""
+
+    def __init__(self) -> None:
+        self._kept: list[_Kept] = []
+
+    def take(self, number: int, genome: Genome, tried: Tried) -> None:
+        """Take what came of a trial."""
+        if tried.discarded or tried.faulty:
+            return
+        insort(self._kept, _Kept(tried.margins[DONE], number, genome))
+        del self._kept[MOST:]
+
+    def cases(self, source: Source, crew: Crew) -> dict[str, Case]:
+        """Return the trials as cases, by name, judged afresh; without those whose assumption does not hold."""
+        found: dict[str, Case] = {}
+        for instance in source.build([own.genome for own in self._kept]):
+            judged = judge(instance, crew.make, crew.name)
+            verdict = judged.score.verdict
+            if verdict is None or verdict.assumption_broken:
+                continue
+            told = replace(_story(judged.score, crew.name), tick=judged.record.instance.ticks)
+            found[f"{DONE}-{len(found) + 1}"] = Case(judged.record.instance, told)
+        return found
+
+    def state(self) -> Any:
+        """Return what a search that is resumed needs, for JSON."""
+        return [[own.done, own.number, own.genome.to_json()] for own in self._kept]
+
+    def restore(self, state: Any) -> None:
+        """Take over what `state` gave."""
+        self._kept = [_Kept(done, number, Genome.from_json(own)) for done, number, own in state]
+
+
+def _story(score: Score, name: str) -> Story:
+    done = f"{score.counted_rounds} counted rounds, {score.goals_visited:.0%} of the goals"
+    told = f"In {score.duration_s:g} s the ego got done {done} and {score.driven.distance_m:.1f} m."
+    return Story(DONE, "driving", 0, name, score.duration_s, 0, told)
+
 
 GENERATION: Final = 128
 """Most trials that are proposed at a time, whoever runs them."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from dubins_traffic.agents.choices import BOUNDS, CHOICE
 from dubins_traffic.errors import InputError, MissingExtraError
-from dubins_traffic.falsification.genome import Genome
+from dubins_traffic.falsification.moves import Genome
 from dubins_traffic.falsification.sampling import Source, Stream
 from dubins_traffic.kernels.arrays import Floats
 
@@ -379,13 +379,7 @@ STRATEGIES: Final[Mapping[str, type[Uniform | Evolution | Cma]]] = {
 
 
 def make(name: str, source: Source, targets: Sequence[str]) -> Strategy:
-    """Return the strategy that a name stands for.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the strategy that a name stands for."""
     if name not in STRATEGIES:
         expected = f"one of {', '.join(STRATEGIES)}"
         raise InputError("no such strategy", file="--strategy", value=name, expected=expected)

@@ -1,10 +1,11 @@
-"""Trials of a search: run together where that can be, and what the search needs to know of each."""
+"""Trials of a search: who runs them, together where that can be, and what the search needs to know of each."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+import contextlib
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
@@ -12,28 +13,27 @@ from dubins_traffic.campaign.chunks import fitting
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.controllers import named
 from dubins_traffic.controllers import registry as controllers
-from dubins_traffic.controllers.registry import COMPILED
-from dubins_traffic.engine.controlled import BatchController, Controlled, Maker, ask_all, check_clear, grouped
-from dubins_traffic.engine.group import Group
-from dubins_traffic.engine.lanes_together import LanesTogether
-from dubins_traffic.engine.sharing import can_share, fitness, undisturbed
-from dubins_traffic.falsification.contract import Kept, kept
+from dubins_traffic.engine.controlled import Maker
+from dubins_traffic.engine.egos import Egos, Way, grouped
+from dubins_traffic.errors import InputError, WorkerLostError
+from dubins_traffic.falsification.contract import Kept, kept, spare
 from dubins_traffic.falsification.coverage import Cell, Manoeuvre
-from dubins_traffic.falsification.liveness import spare
 from dubins_traffic.falsification.passages import Passages, find_passages
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.record.reader import Record, replay
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.runs.single import run_trial
+from dubins_traffic.runs.crew import Cancelled, carry_out
+from dubins_traffic.runs.crew import Crew as Workers
+from dubins_traffic.runs.ray_crew import check_address, crew_at
 from dubins_traffic.scoring.margins import LIVENESS
 from dubins_traffic.scoring.score import Score, score
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Ruling
-from dubins_traffic.shield.tables import Overtakes, check_overtakes
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.protocols import Ending
+
 
 FORMULA: Final = "formula"
 """What a search calls a formula of the problem's own begins with this."""
@@ -45,7 +45,6 @@ BROKEN: Final = -1e-9
 BOXES: Final = 8
 """So many trials of a controller in a box run at a time, each with a process of its own."""
 MOST: Final = 256
-Cancelled = Callable[[], bool]
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +99,7 @@ class Tried:
         return Tried(**own)
 
 
-class Laboratory:
+class TrialRunner:
     """Runs the trials of a search.
 
     Parameters
@@ -114,27 +113,18 @@ class Laboratory:
     ----------
     answer_s : float or None
         How long the controller took for an answer in the last trials in which it was asked, seconds; None before.
-
-    Raises
-    ------
-    InputError
-        If there is no such controller.
     """
 
     def __init__(self, controller: str | Maker | Remote, cancelled: Cancelled = lambda: False) -> None:
-        self._name = controller if isinstance(controller, str) else "controller"
         self.cancelled = cancelled
         self.answer_s: float | None = None
-        self._number, self._fit = 0, fitness()
+        self._number = 0
         self._remote = controller if isinstance(controller, Remote) else None
-        self._overtakes: Overtakes | None
-        self._lanes, self._overtakes = lanes_of(self._name)
         if isinstance(controller, Remote):
             return
-        self._make = (lambda: controllers.load(controller)) if isinstance(controller, str) else controller
-        made = controllers.made(self._make)
-        self._shared = made if isinstance(made, BatchController) else None
-        self._most = BOXES if named.SANDBOX.search(self._name) else MOST
+        self._egos = Egos(controller, uncounted=True)
+        self._is_shared = self._egos.shared is not None
+        self._most = BOXES if named.SANDBOX.search(self._egos.name) else MOST
 
     def attempt(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
         """Run the trials of instances; yield what came of some, by their places in `instances`, as they end.
@@ -148,28 +138,24 @@ class Laboratory:
             When it is cancelled.
         """
         places = {id(own): k for k, own in enumerate(instances)}
-        together = [own for own in instances if self._remote is None and can_share(own)]
-        known = self._name == COMPILED or self._lanes
-        compiled = [own for own in together if known and self._fit(own) and undisturbed(own)]
-        fast = set(map(id, compiled))
-        for own in grouped(compiled):
-            yield self._taken(self._finished(own), places)
-        for own in grouped([own for own in together if id(own) not in fast]):
+        ways = {Way.ALONE: list(instances)} if self._remote is not None else self._egos.ways(instances)
+        for own in grouped(ways.get(Way.COMPILED, ())):
+            self.answer_s = 0.0
+            yield self._together(own, Way.COMPILED, places)
+        for own in grouped(ways.get(Way.ASKED, ())):
             first = 0
             while first < len(own):
                 some = own[first : first + self._count(own[first:])]
-                yield self._taken(self._steered(some), places)
+                yield self._together(some, Way.ASKED, places)
                 first += len(some)
-        shared = set(map(id, together))
-        for own in instances:
-            if id(own) not in shared:
-                self._check()
-                yield {places[id(own)]: self._alone(own)}
+        for own in ways[Way.ALONE]:
+            self._check()
+            yield {places[id(own)]: self._alone(own)}
 
     def _count(self, instances: Sequence[Instance]) -> int:
         """Return how many of some trials whose controllers are asked in every tick run together."""
         most = min(self._most, len(instances))
-        if self._shared is not None:
+        if self._is_shared:
             return most
         return fitting(self.answer_s, max(own.ticks for own in instances), most)
 
@@ -186,43 +172,18 @@ class Laboratory:
         if self.cancelled():
             raise KeyboardInterrupt
 
-    def _finished(self, instances: Sequence[Instance]) -> Group:
-        """Return trials that have been run without asking anybody for commands in Python."""
-        self.answer_s = 0.0
-        if not self._lanes:
-            group = Group(instances, keeps_rules=True)
-            group.finish(self.cancelled)
-        else:
-            own = LanesTogether(instances, self._overtakes)
-            group = own.group
-            while len(group.active) and not self.cancelled():
-                own.step()
-        self._check()
-        return group
-
-    def _steered(self, instances: Sequence[Instance]) -> Group:
-        """Return trials that have been run, whose controllers were asked in every tick."""
-        shared = self._shared
-        if shared is not None:
-            check_clear(instances)
+    def _together(
+        self, instances: Sequence[Instance], way: Way, places: Mapping[int, int]
+    ) -> dict[int, Tried]:
+        """Run trials that are stepped together; return what came of them, by the places of their instances."""
         numbers = range(self._number, self._number + len(instances))
         self._number = numbers.stop
-        seats = Controlled(instances, self._make, shared, numbers=numbers)
-        latencies: list[Mapping[str, float]] = []
-        while len(seats.group.active):
-            self._check()
-            if shared is None:
-                seats.ask_each()
-            else:
-                ask_all([seats], shared)
-            latencies += [outcome.act_s for outcome in seats.step(self._name)]
-        self._note(latencies)
-        return seats.group
-
-    def _taken(self, group: Group, places: Mapping[int, int]) -> dict[int, Tried]:
-        """Return what came of a group whose trials have all ended, by the places of their instances."""
+        group = self._egos.group(instances, way, numbers=numbers)
+        group.finish(self.cancelled)
+        self._check()
         ego = group.world.tally.ego
-        outcomes = group.outcomes(range(len(group.instances)), self._name)
+        outcomes = group.fresh(self._egos.name)
+        self._note(outcome.act_s for outcome in outcomes)
         frames = np.array([outcome.ending.ticks + 1 for outcome in outcomes])
         networks = [own.problem.network for own in group.instances]
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
@@ -237,8 +198,7 @@ class Laboratory:
             found, passages = judged_record(record)
             return _tried_alone(instance, found, record.ending, passages)
         ego = EgoTrace()
-        driver = controllers.made(self._make)
-        result = run_trial(instance, driver, sinks=[ego], name=self._name, sketch=False)
+        result = self._egos.alone(instance, sinks=[ego])
         self._note([result.wall.act_s])
         return _tried_alone(instance, result.score, result.ending, ego.passages())
 
@@ -331,13 +291,134 @@ def in_order(parts: Iterable[Mapping[int, Tried]]) -> list[Tried]:
     return [found[k] for k in range(len(found))]
 
 
-def lanes_of(name: str) -> tuple[bool, Overtakes | None]:
-    """Tell whether a name is that of `lanes`, and when its shield overtakes; None without a shield."""
-    bare, overtakes = controllers.shield_of(name) or (name, None)
-    return bare == "lanes", None if overtakes is None else check_overtakes(overtakes)
-
-
 def broken_formulas(score: Score) -> dict[str, float]:
     """Return the seconds at which the problem's own formulas became false, by what a search calls them."""
     false = [own for own in score.formulas if own.verdict == "false"]
     return {f"{FORMULA} {own.name}": own.time for own in false if own.time is not None}
+
+
+MOST_IN_CHUNK: Final = 32
+"""Most trials that a worker is handed at a time."""
+
+
+class Crew(Protocol):
+    """Runs the trials of a search.
+
+    Attributes
+    ----------
+    make : callable or Remote
+        Makes the controller, or drives trials elsewhere.
+    name : str
+        What records and cases call it.
+    """
+
+    make: Maker | Remote
+    name: str
+
+    def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
+        """Run the trials of instances; yield what came of some, by their places in `instances`, as they end.
+
+        What comes of them does not depend on who runs them.
+        """
+        ...
+
+
+class LocalRunner:
+    """Runs all trials in this process."""
+
+    def __init__(self, controller: str | Maker | Remote, name: str) -> None:
+        self.make = driver_of(controller)
+        self.name = name
+        self._runner = TrialRunner(controller)
+
+    def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
+        """Run the trials of instances, and yield what came of some as soon as they have ended."""
+        return self._runner.attempt(instances)
+
+
+@dataclass(frozen=True, slots=True)
+class TrialChunk:
+    """Some trials of a search, for a worker; `first` is the place of the first among those that are run."""
+
+    number: int
+    controller: str
+    first: int
+    instances: tuple[Instance, ...]
+
+    def run(self, cancelled: Cancelled) -> tuple[list[Tried], float | None]:
+        """Run the trials; return what came of them, and how long their controller takes for an answer."""
+        if self.controller not in _runners:
+            _runners[self.controller] = TrialRunner(self.controller)
+        runner = _runners[self.controller]
+        runner.cancelled = cancelled
+        return in_order(runner.attempt(self.instances)), runner.answer_s
+
+
+_runners: dict[str, TrialRunner] = {}
+
+
+class PoolRunner:
+    """Hands chunks of trials to workers."""
+
+    def __init__(self, controller: str, workers: Workers) -> None:
+        controllers.load(controller)
+        self.make: Maker | Remote = maker(controller)
+        self.name = controller
+        self._workers = workers
+        self._number = 0
+        self._answer_s: float | None = None
+
+    def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
+        """Run the trials of instances, some at a time; a chunk whose worker ends is run again, a few times."""
+        for chunk, found in carry_out(self._workers, self._chunks(instances)):
+            if found is None:
+                raise WorkerLostError(f"workers end in the middle of trials: {self.name} may end its process")
+            tried: list[Tried] = found[0]
+            self._answer_s = found[1]
+            yield dict(enumerate(tried, chunk.first))
+
+    def _chunks(self, instances: Sequence[Instance]) -> Iterator[TrialChunk]:
+        """Yield chunks of the trials of instances, of what their controller does in about a second."""
+        first = 0
+        while first < len(instances):
+            rest = instances[first : first + MOST_IN_CHUNK]
+            some = rest[: fitting(self._answer_s, max(own.ticks for own in rest), len(rest))]
+            yield TrialChunk(self._number, self.name, first, tuple(some))
+            self._number += 1
+            first += len(some)
+
+
+def maker(controller: str | Maker) -> Maker:
+    """Return what makes a controller that is given by name, or by what makes it."""
+    return (lambda: controllers.load(controller)) if isinstance(controller, str) else controller
+
+
+def driver_of(controller: str | Maker | Remote) -> Maker | Remote:
+    """Return what makes a controller, or what drives trials elsewhere."""
+    return controller if isinstance(controller, Remote) else maker(controller)
+
+
+def name_of(controller: str | Maker | Remote) -> str:
+    """Return what records and cases call a controller."""
+    if isinstance(controller, str):
+        return controller
+    return (
+        controller.name if isinstance(controller, Remote) else getattr(controller, "__name__", "controller")
+    )
+
+
+@contextlib.contextmanager
+def crew_of(controller: str | Maker | Remote, name: str, workers: int, ray: str | None) -> Generator[Crew]:
+    """Yield who runs the trials of a search with a controller: `workers` processes, or a Ray cluster at an address."""
+    if workers == 1 and ray is None:
+        yield LocalRunner(controller, name)
+        return
+    if not isinstance(controller, str):
+        expected = "a controller given by name, not one elsewhere"
+        raise InputError(
+            "can't be made by other processes", field="controller", value=name, expected=expected
+        )
+    if ray is not None:
+        check_address(ray)
+    with contextlib.closing(crew_at(ray, workers)) as crew:
+        yield PoolRunner(controller, crew)

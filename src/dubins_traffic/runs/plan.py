@@ -67,13 +67,7 @@ class Plan:
 def concluded(
     results: Sequence[Result], configuration: Configuration | None, data: Path | None, began: datetime
 ) -> ScoreSheet:
-    """Return the scores of finished trials, and write the trial data file `data` of a configuration, if it is given.
-
-    Raises
-    ------
-    InputError
-        If the file can't be written.
-    """
+    """Return the scores of finished trials, and write the trial data file `data` of a configuration, if it is given."""
     if results and data is not None and configuration is not None:
         made = TrialData.build(configuration, [result.instance for result in results], began)
         made.write(data, overwrite=True)
@@ -180,13 +174,7 @@ def plan(
 def load_runnable(
     source: str | os.PathLike[str], *, rnd: str | os.PathLike[str] | None, seed: int
 ) -> Configuration | Instance | Record:
-    """Return what `sources.load` returns, unless it is a road network, of which no trials can be run.
-
-    Raises
-    ------
-    InputError
-        If it can't be read, or is a road network.
-    """
+    """Return what `sources.load` returns, unless it is a road network, of which no trials can be run."""
     found = load(source, rnd=rnd, seed=seed)
     if isinstance(found, RoadNetwork):
         expected = "a trials configuration, a problem instance or a record"

@@ -87,12 +87,6 @@ def claim(
         cut off, interrupted or lost with their transport are run again.
     placed : bool
         Whether cars may have been moved before a trial; then a record of the same instance may have other starts.
-
-    Raises
-    ------
-    InputError
-        If the folder holds records and neither or both of `overwrite` and `append` are given; if a record is of
-        another run; or if another process writes there.
     """
     if overwrite and append:
         raise InputError("both at once", file="--overwrite, --append", expected="one of them")

@@ -19,7 +19,6 @@ from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.record import reader
 from dubins_traffic.record.sink import FAULTS, End
-from dubins_traffic.runs.jobs import Job
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.score import score
 from dubins_traffic.viewer.replay import write_replay
@@ -175,16 +174,7 @@ def replay(campaign: Campaign, row: Mapping[str, Any], page: Path) -> rows.Row:
     chunk = _chunk(campaign, row["number"])
     with tempfile.TemporaryDirectory() as folder:
         record = Path(folder) / "trial.mcap"
-        job = Job(
-            chunk.trial,
-            chunk.seed,
-            chunk.controller,
-            configuration=chunk.configuration,
-            record=record,
-            deadline=chunk.deadline,
-            metrics=chunk.metrics,
-        )
-        result = job.run()
+        result = chunk.job(0, record).run()
         found = reader.read(record)
     verdict = score(found).verdict
     summary = {"controller": row["controller"], **{name: row[name] for name in SUMMARY}}

@@ -72,7 +72,7 @@ def page(comparison: Comparison, manifest: Mapping[str, Any], worst: Mapping[str
         pairs=list(dict.fromkeys((one.first, one.second) for one in comparison.differences)),
         factors=[_against(comparison, factor) for factor in comparison.factors],
         worst=worst,
-        shares=_shown_shares(comparison),
+        shares=_page_shares(comparison),
         made=_made(manifest),
         number=_number,
         words=words,
@@ -111,7 +111,7 @@ def _against(comparison: Comparison, factor: str) -> tuple[str, list[tuple[str, 
     return factor, charts, silent
 
 
-def _shown_shares(comparison: Comparison) -> list[tuple[str, list[str], list[str], list[Any], str]]:
+def _page_shares(comparison: Comparison) -> list[tuple[str, list[str], list[str], list[Any], str]]:
     """Return tables of shares: heading, what is counted, the same in words, shares by controller, the clauses."""
     standings = comparison.standings
     groups = {
@@ -245,11 +245,6 @@ def replay_trial(
         Where the replay is.
     note : str
         What is odd about it: that it went another way; empty if it went as in the campaign.
-
-    Raises
-    ------
-    InputError
-        If there is no campaign in `folder`, the trial has not been run, or the page can't be written.
     """
     if output is not None:
         require_output(output, "a page", PAGES, overwrite=overwrite)
