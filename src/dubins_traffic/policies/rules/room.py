@@ -179,7 +179,7 @@ def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
         elif labels.at[b, j] == start:
             takes = aside <= 0.0
         else:
-            takes = takes_lane(b, j, along, aside, lane, vehicle, state, labels, roads)
+            takes = takes_lane(b, int(j), along, aside, lane, vehicle, state, labels, roads)
         if takes:
             return False
         j = scratch.link[j]
