@@ -68,7 +68,7 @@ class _Plotted:
         self._body = problem.car.body
         canvas = Canvas(problem.network, problem.car, ())
         canvas.roads()
-        canvas.goals(problem)
+        canvas.problem(problem)
         canvas.finish("")
         canvas.figure.set_size_inches(4.0, 4.0)
         canvas.axes.set_position((0.0, 0.0, 1.0, 1.0))

@@ -18,7 +18,7 @@ from dubins_traffic.files import replace_file
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.viewer import palette
+from dubins_traffic.viewer import palette, shapes
 from dubins_traffic.viewer.canvas import METADATA, Canvas
 from dubins_traffic.viewer.plot import STYLE
 from dubins_traffic.viewer.scene import Extent
@@ -127,7 +127,11 @@ class Panel:
     def cars(self, *poses: Pose, ghost: bool = False, names: bool = True, notes: Sequence[str] = ()) -> None:
         """Draw the ego and the e-agents A, B, ..., with their names behind them, and notes after the names."""
         tried = instance(self.network, poses)
-        self.canvas.cars(tried, poses, ghost=ghost)
+        self.canvas.order = 5.0 if ghost else 6.0
+        if ghost:
+            self.canvas.draw(shapes.cars(CAR.body, tried.names, poses, ghost=True))
+        else:
+            self.canvas.cars(tried, poses)
         if not names:
             return
         for n, (name, p) in enumerate(zip(tried.names, poses, strict=True)):
@@ -140,10 +144,9 @@ class Panel:
 
     def goal(self, name: str = "goal") -> None:
         """Draw the disc of the crossing as a goal."""
-        self.canvas.goals(instance(self.network, [pose(0, 0, 0)], [(1, 1)]).problem)
-        for text in list(self.axes.texts):
-            if text.get_text().startswith("goal"):
-                text.remove()
+        problem = instance(self.network, [pose(0, 0, 0)], [(1, 1)]).problem
+        self.canvas.order = 2.5
+        self.canvas.problem(problem)
         self.note(0.0, 0.55, name, colour="#00684B", bold=True)
 
     def disc(self) -> None:
