@@ -79,6 +79,12 @@ CLAIMS: Mapping[str, Claim] = {
         "falsify.md#how-soon",
         "hours",
     ),
+    "conformance": Claim(
+        "who keeps an ego waiting beyond the bound breaks a rule, and no clean ego brings a lawful car to a breach, in "
+        "scenes that try it",
+        "theory.md#on-the-road",
+        "a quarter of an hour",
+    ),
     "contract": Claim(
         "who keeps E1 to E6 keeps no ego waiting for ever, and no clean ego brings a lawful car to a breach, as far as "
         "searches tell",
