@@ -260,7 +260,9 @@ class Judge:
             return True
         for other in self.cars:
             its = self.past[k][other]
-            rear = here - reach if other == 0 else here
+            follows = other == 0 and not its["stands"]
+            self.fired["the ego stands behind"] += other == 0 and its["stands"] and its["progress"] < here
+            rear = here - reach if follows else here
             behind = its["lane"] == facts["lane"] and its["progress"] < rear and not its["left"]
             there = its["segment"] == lane[0] and not behind
             if other != n and (there or its["crosses"] == facts["toward"]):

@@ -376,19 +376,19 @@ class Reference:
             window = (s - rules["overtaking_behind"], s + rules["overtaking_ahead"])
             reach = self.obstacle_range(car.lane, obstacle, *window)
             near |= reach is not None and self.narrows(*reach)
-        if facts["blocked"]:
-            car.overtaking = True
-        elif not near and not car.left:
-            car.overtaking = False
-        if facts["entered"] or car.crosses == self.toward(car.lane):
-            car.overtaking = False
-        reach = self.lateral_range(car.lane, car)[1]
+        reach, was_left = self.lateral_range(car.lane, car)[1], car.left
         if reach > rules["left_set"]:
             if not car.left:
                 car.moved = set()
             car.left = True
         elif reach < rules["left_release"]:
             car.left = False
+        if facts["blocked"]:
+            car.overtaking = True
+        elif not near and not was_left and not car.left:
+            car.overtaking = False
+        if facts["entered"] or car.crosses == self.toward(car.lane):
+            car.overtaking = False
         facts.update(left=car.left, overtaking=car.overtaking)
 
     def hem_in(self, car: Car) -> None:

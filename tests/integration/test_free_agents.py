@@ -29,12 +29,11 @@ TRIALS = 2048 if os.environ.get("DUBINS_TRAFFIC_CONTRACT") == "full" else 128
 SECONDS = 120.0
 OPEN: dict[str, set[int]] = {
     "free": {464, 998, 1316},
-    "lawful": {7, 20, 1235, 1343, 1535, 1559, 1813, 1911},
-    "ego": {193, 1965},
+    "lawful": set(),
+    "ego": set(),
 }
 """Trials with a breach, by who is first to break a rule. A free car (E4 in a bend, once E3) has turned back where it
-found no exit, or stands against another that comes the other way. A lawful car in a crossing (E4) has chosen an exit
-that a free car then closes, by backing up or stopping; it turns to another one too late. 1813, 193 and 1965: 2.left."""
+found no exit, or stands against another that comes the other way."""
 NETWORKS: tuple[dict[str, Any], ...] = (
     {"grid": {"rows": 2, "columns": 3, "length": 4.0}},
     {"random": {"intersections": 6, "segments": 7, "bent": 0.6}},

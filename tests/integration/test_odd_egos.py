@@ -35,14 +35,7 @@ def test_no_odd_ego_brings_a_lawful_car_to_a_breach(odd: list[Oddity]) -> None:
     assert [(one.number, one.kind, one.others) for one in odd if one.others] == []
 
 
-OPEN = pytest.mark.xfail(
-    reason="it moves up into a bend behind one who passes an obstacle in its exit, which counts as free"
-)
-
-
-@pytest.mark.parametrize(
-    "number", [pytest.param(number, marks=OPEN) if number == 3835 else number for number in FELL + FELL_LATER]
-)
+@pytest.mark.parametrize("number", FELL + FELL_LATER)
 def test_what_once_was_a_breach_is_none(number: int) -> None:
     one = trial(number)
     assert one.counts

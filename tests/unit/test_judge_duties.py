@@ -407,21 +407,26 @@ def test_e5_an_obstacle_excuses_who_may_lack_room_to_pass_it() -> None:
         *more: tuple[float, float],
         far: float = 2.4,
         at: float = 1.6,
+        follows: float | None = None,
         **rules: float,
     ) -> list[tuple[object, ...]]:
         trial = case(roads, 2, **{**SOON, **rules})
         places = [on_lane(roads, lane, *place)[:2] for place in ((far, -0.3), *more)]
         obstacles = tuple(DiscObstacle(x, y, 0.1) for x, y in places)
         problem = replace(trial.problem, obstacles=obstacles)
-        return said(
-            judged(replace(trial, problem=problem), hold(ego, on_lane(roads, lane, at, -0.3), frames=31))
-        )
+        script = hold(ego, on_lane(roads, lane, at, -0.3), frames=31 if follows is None else 41)
+        if follows is not None:
+            for k, frame in enumerate(script):
+                frame[0] = on_lane(roads, lane, 1.25 + 0.1 * k * follows, -0.3)
+        return said(judged(replace(trial, problem=problem), script))
 
     elsewhere = on_lane(roads, lanes_in(roads)[1], 1.6, -0.3)
     late = [("E5", 1, 30, 0)]
     assert found(elsewhere) == late
     assert found(on_lane(roads, lane, 1.2 - EPS, -0.3), at=2.7, far=2.74) == late
     assert found(on_lane(roads, lane, 1.2 + EPS, -0.3), at=2.7, far=2.74) == []
+    assert found(elsewhere, at=2.7, far=2.74, follows=0.04) == [("E5", 1, 39, 0)]
+    assert found(elsewhere, at=2.7, far=2.74, follows=0.06) == []
     assert found(on_lane(roads, lane, 1.4, 0.3)) == []
     assert found(on_lane(roads, lane, 2.6, -0.3)) == []
     assert found(on_lane(roads, lane ^ 1, length - 0.9, -0.3)) == []

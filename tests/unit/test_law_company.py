@@ -73,6 +73,20 @@ def test_nobody_passes_an_ego_that_stands() -> None:
     assert score.collisions == ()
 
 
+@pytest.mark.parametrize("behind", [0.4, 0.9, 1.3])
+def test_an_obstacle_is_passed_though_the_ego_stands_behind(behind: float) -> None:
+    """Else both would wait for ever: the ego, as an e-agent does, for the car before it to go on."""
+    x, y, _ = turned(3.5, -W)
+    disc = {"disc": {"x": x, "y": y, "radius": 0.1}}
+    one = car("lawful", "one", turned(2.6, -W))
+    watch = Watch()
+    instance = on_grid([one], 80.0, turned(2.6 - behind, -W), obstacles=[disc])
+    score = run_trial(instance, Stands(), sinks=[watch]).score
+    assert breaches(score) == []
+    last = watch.frames_seen[-1]
+    assert math.hypot(last.x[-1, 1] - x, last.y[-1, 1] - y) > 2.0
+
+
 def test_an_obstacle_behind_a_crossing_is_not_driven_to() -> None:
     """Of the three ways on from the crossing at (6, 0) one is barred just behind it."""
     x, y, _ = turned(7.4, -W)

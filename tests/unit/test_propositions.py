@@ -354,6 +354,19 @@ def test_overtaking_lasts_until_the_block_is_passed_and_the_lane_taken(roads: Ro
 
 
 @both
+def test_overtaking_goes_on_for_who_is_left_when_what_blocked_drives_off(roads: RoadNetwork) -> None:
+    """The car ahead moves in frame 12, and stands no longer; the other comes over the line then, or a frame later."""
+    parked, gone = on_lane(roads, OUT_WEST, 2.4, -0.3), on_lane(roads, OUT_WEST, 2.6, -0.3)
+    behind, over = on_lane(roads, OUT_WEST, 1.3, -0.3), on_lane(roads, OUT_WEST, 1.32, 0.0)
+    for late in (0, 1):
+        script = [[behind, parked] for _ in range(12)]
+        script += [[over if k >= late else behind, gone] for k in range(3)]
+        found = flags(label([instance(roads, 2)], [script]), 0)
+        assert ["overtaking" in flag for flag in found[11:]] == [True] + 3 * [late == 0]
+        assert ["left" in flag for flag in found[11:]] == [False, late == 0, True, True]
+
+
+@both
 def test_overtaking_ends_on_entering_a_disc(roads: RoadNetwork) -> None:
     parked = on_lane(roads, WEST, 3.6, -0.3)
     script = [

@@ -28,7 +28,7 @@ from dubins_traffic.policies.rules.tables import (
     vehicles_of,
 )
 from dubins_traffic.problem.cycles import cycle_lanes
-from dubins_traffic.problem.kinds import KEEP_RULES, parameters_of
+from dubins_traffic.problem.kinds import FREE, KEEP_RULES, parameters_of
 from dubins_traffic.roads.table import pack_distinct
 
 if TYPE_CHECKING:
@@ -180,6 +180,7 @@ def _fleet(instance: Instance, cars: int) -> _Fleet:
         if agent.kind in KEEP_RULES:
             given = {**_defaults(agent.kind), **agent.parameters}
             _describe(agent.kind, given, instance.problem.car.bounds.speed, own.cars[n])
+            own.cars[n].whims = given_agent.kind == FREE
             rows = given.get("choices", ())
             if rows:
                 own.choice[n] = cut(from_rows(rows), own.cars[n].speed, instance.problem)

@@ -192,8 +192,8 @@ def _lacks_room(b: int, n: int, place: RightLane, here: float, v: int, tables: R
     """Tell whether an obstacle narrows the lane ahead of car n, and it may lack the room to pass that now.
 
     It lacks it if obstacles narrow the left lane, too, or the right one up to the disc of v at its end; or if another
-    car is in that disc or on the road, unless it is behind in the same lane and not the ego near by, who may come
-    beside it.
+    car is in that disc or on the road, unless it is behind in the same lane and not the ego near by that does not
+    stand, and may come beside it.
 
     Norm: docs/rules.md#lacks-room.
     """
@@ -210,9 +210,10 @@ def _lacks_room(b: int, n: int, place: RightLane, here: float, v: int, tables: R
     for k in range(tables.state.count[b]):
         if k == n:
             continue
-        rear = here - way - GRAIN if k == EGO else here
+        bits = np.int64(labels.bits[b, k])
+        rear = here - way - GRAIN if k == EGO and bits & FLAG.STANDS == 0 else here
         behind = labels.lane[b, k] == place.lane and tables.memory.car[b, k].progress < rear
-        behind = behind and np.int64(labels.bits[b, k]) & FLAG.LEFT == 0
+        behind = behind and bits & FLAG.LEFT == 0
         if labels.crosses[b, k] == v or (labels.segment[b, k] == place.lane // 2 and not behind):
             return True
     return False

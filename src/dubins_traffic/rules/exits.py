@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 from dubins_traffic.cars.near import list_near, ticks_within
-from dubins_traffic.cars.state import EGO
+from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.roads.lookup import lane_coordinates, lane_direction_at, lane_start
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.blocking import lane_of, narrows, obstacle_narrows
 from dubins_traffic.rules.breach_log import RefereeParameters, RefereeTables
-from dubins_traffic.rules.shape import half_across
+from dubins_traffic.rules.shape import Shape, half_across
 from dubins_traffic.rules.tables import GRAIN, TrialRules
 
 
@@ -65,23 +66,41 @@ def _passes_by(k: int, came: int, back: int) -> bool:
     return k != EGO and came >= 0 and came // 2 != back
 
 
-@jit
-def _takes(b: int, k: int, lane: int, along: float, lateral: float, tables: RefereeTables) -> bool:
-    """Tell whether car k, whose centre is outside the disc at the beginning of `lane` and near it, takes that lane.
+class LaneOut(NamedTuple):
+    """The lane `lane` (index) of network `net` out of a disc: `width` metres wide, a car needs `needed` metres."""
 
-    `along` (m) and `lateral` (m) are its coordinates there. Its body narrows the lane, or its centre is in it and the
-    car does not go toward the disc.
+    net: int
+    lane: int
+    width: float
+    needed: float
+
+
+@jit
+def takes_lane(
+    b: int,
+    k: int,
+    along: float,
+    lateral: float,
+    out: LaneOut,
+    body: Shape,
+    state: State,
+    labels: Labels,
+    roads: RoadTable,
+) -> bool:
+    """Tell whether car k, whose centre is outside the disc at the beginning of a lane and near it, takes that lane.
+
+    `along` (m) and `lateral` (m) are its coordinates there. Its `body` narrows the lane, or its centre is in it and the
+    car does not go toward the disc. The referee asks this of the lane `out`, and so do drivers.
 
     Norm: docs/rules.md#takes.
     """
-    state, labels, roads, own = tables.state, tables.labels, tables.roads, tables.rules[b]
-    if labels.segment[b, k] != lane // 2 or along <= 0.0:
+    if labels.segment[b, k] != out.lane // 2 or along <= 0.0:
         return False
-    if labels.lane[b, k] != lane ^ 1 and -own.lane_width - GRAIN <= lateral <= GRAIN:
+    if labels.lane[b, k] != out.lane ^ 1 and -out.width - GRAIN <= lateral <= GRAIN:
         return True
-    tx, ty = lane_direction_at(roads, own.net, lane, state.x[b, k], state.y[b, k])
-    half = half_across(b, k, tx, ty, state, own)
-    return narrows(lateral - half, lateral + half, own.lane_width, own.free_needed + GRAIN)
+    tx, ty = lane_direction_at(roads, out.net, out.lane, state.x[b, k], state.y[b, k])
+    half = half_across(b, k, tx, ty, state, body)
+    return narrows(lateral - half, lateral + half, out.width, out.needed + GRAIN)
 
 
 @jit_inline
@@ -148,7 +167,8 @@ def taken_exits(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables
             way = to_mouth(from_x, from_y, own, terms)
             in_the_way = to_mouth(along, lateral, own, terms) < way + GRAIN
         else:
-            in_the_way = _takes(b, k, lane, along, lateral, tables)
+            out = LaneOut(net, lane, own.lane_width, own.free_needed)
+            in_the_way = takes_lane(b, k, along, lateral, out, own, state, tables.labels, t)
         if in_the_way:
             taken |= 1 << arm
     return taken

@@ -1,6 +1,6 @@
 """The propositions of one frame, for all cars of a batch.
 
-Their order is docs/rules.md#order-in-a-frame: lane state, still, queue, blocked, overtaking, left, hemmed.
+Their order is docs/rules.md#order-in-a-frame: lane state, still, queue, blocked, left, overtaking, hemmed.
 """
 
 from __future__ import annotations
@@ -258,16 +258,16 @@ def _label_blocked(b: int, n: int, tick: int, tables: LabelTables) -> bool:
         if bits & FLAG.OVERTAKING == 0:
             forget_region(tables.memory.kept[b, n // BLOCK], n)
         bits |= FLAG.BLOCKED | FLAG.OVERTAKING
-    elif not beside and bits & FLAG.LEFT == 0:
-        bits &= ~FLAG.OVERTAKING
-    if bits & FLAG.ENTERED != 0 or labels.crosses[b, n] == lane_end(t, own.net, lane):
-        bits &= ~FLAG.OVERTAKING
+    was_left = bits & FLAG.LEFT != 0
     if car.reach > own.left_set:
         if bits & FLAG.LEFT == 0:
             car.left_since = tick
         bits |= FLAG.LEFT
     elif car.reach < own.left_release:
         bits &= ~FLAG.LEFT
+    ends = not beside and not blocked and not was_left and bits & FLAG.LEFT == 0
+    if ends or bits & FLAG.ENTERED != 0 or labels.crosses[b, n] == lane_end(t, own.net, lane):
+        bits &= ~FLAG.OVERTAKING
     labels.bits[b, n] = bits
     return bits & FLAG.LEFT != 0
 

@@ -109,17 +109,37 @@ def take_last_resort(b: int, n: int, traffic: Traffic) -> bool:
 
 
 @jit_rare
-def take_way_on(b: int, n: int, traffic: Traffic) -> None:
-    """Choose an exit that is free (E4), even if it is barred beyond, for a car that would turn round in a bend."""
+def take_way_on(b: int, n: int, full: bool, traffic: Traffic) -> bool:
+    """Choose the way on, even if it is barred beyond, for a car that would turn round in a bend; tell whether it does.
+
+    It takes no exit that is not free (E4), unless it may be `full`.
+    """
     roads, drivers = traffic.roads, traffic.drivers
     net = drivers.net[b]
     car = drivers.car[b, n]
     row = roads.vert_off[net] + lane_end(roads, net, car.lane)
+    found = False
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
         on = out != car.lane ^ 1 and leads_out(b, car.lane, out, traffic)
-        if on and is_free(b, n, out, traffic):
+        if on and (full or is_free(b, n, out, traffic)):
             car.next_lane = out
+            found = True
+    return found
+
+
+@jit_rare
+def is_way_on_free(b: int, n: int, traffic: Traffic) -> bool:
+    """Tell whether an exit other than the way back is free (E4) for a car before a bend, wherever it leads."""
+    roads, drivers = traffic.roads, traffic.drivers
+    net = drivers.net[b]
+    car = drivers.car[b, n]
+    row = roads.vert_off[net] + lane_end(roads, net, car.lane)
+    found = False
+    for k in range(roads.degree[row]):
+        out = int(roads.arms[row, k])
+        found = found or (out != car.lane ^ 1 and is_free(b, n, out, traffic))
+    return found
 
 
 @jit_rare

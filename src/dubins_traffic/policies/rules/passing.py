@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from math import sqrt
 
+import numpy as np
+
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
@@ -30,7 +32,7 @@ COMES = 0.7
 SPARE = 0.6
 """Metres to spare before an oncoming car."""
 FOLLOWED = 1.5
-"""No e-agent begins to pass while the ego is this near behind, metres: the ego might take its place."""
+"""No e-agent begins to pass while the ego drives this near behind, metres: the ego might take its place."""
 OVERTAKEN = 2.0
 """A car that comes from behind on the left within this distance is let past first, metres."""
 NARROWS = 1.5
@@ -215,12 +217,18 @@ def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic
 def ego_is_beside(
     b: int, own: float, back: float, way: ReferencePath, traffic: Traffic, lane: int, vehicle: Vehicle
 ) -> bool:
-    """Tell whether the ego is in the lane where car n would pass: it might stay beside n, or stop where n returns."""
+    """Tell whether the ego is in the lane where car n would pass: it might stay beside n, or stop where n returns.
+
+    One that stands behind n in its lane does not count: until it has set off, n is ahead of it on the left.
+    """
     state, labels = traffic.state, traffic.labels
     if labels.segment[b, EGO] != lane >> 1:
         return False
     key = along(way, state.x[b, EGO], state.y[b, EGO])
     left = aside(way, state.x[b, EGO], state.y[b, EGO])
+    bits = np.int64(labels.bits[b, EGO])
+    if key < own and labels.lane[b, EGO] == lane and bits & (FLAG.STANDS | FLAG.LEFT) == FLAG.STANDS:
+        return False
     return (
         left < vehicle.middle and own - FOLLOWED < key < back + vehicle.backs_up + 2.0 * vehicle.reach + BERTH
     )

@@ -11,6 +11,7 @@ from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.choice import (
     is_about_to_enter,
+    is_way_on_free,
     take_another,
     take_last_resort,
     take_way_on,
@@ -124,17 +125,29 @@ def may_enter_bend(
     else:
         free = has_room(b, n, car.next_lane, inside, traffic)
         if long and inside == 0:
-            free = free or is_free(b, n, car.next_lane, traffic) or moves_up(v, degree, car, drivers)
+            free = free or is_free(b, n, car.next_lane, traffic) or moves_up(b, n, v, degree, traffic)
     if long and not free and turns and degree == 2:
-        take_way_on(b, n, traffic)
+        take_way_on(b, n, False, traffic)
     car.kept_out = 0 if free else car.kept_out + 1
     return free
 
 
-@jit_inline
-def moves_up(v: int, degree: Any, car: Driver, drivers: Drivers) -> bool:
-    """Tell whether a car that has waited for long before v goes in though no exit is free: it is no goal (E5)."""
-    return degree <= 2 and not minds_goal(v, car, drivers)
+@jit_rare
+def moves_up(b: int, n: int, v: int, degree: Any, traffic: Traffic) -> bool:
+    """Tell whether a car that has waited for long before v goes in though its exit is not free: v is no goal (E5).
+
+    Who would turn round in a bend, where the way back is no exit, takes the way on, if obstacles leave it one. If they
+    leave none, it does not go in while the way on counts as free, since it would then owe E4.
+    """
+    car = traffic.drivers.car[b, n]
+    if degree > 2 or minds_goal(v, car, traffic.drivers):
+        return False
+    return (
+        degree < 2
+        or not turns_round(car)
+        or take_way_on(b, n, True, traffic)
+        or not is_way_on_free(b, n, traffic)
+    )
 
 
 @jit_inline

@@ -12,9 +12,9 @@ from dubins_traffic.policies.rules.narrow import offset_in_lane
 from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
-from dubins_traffic.rules.blocking import narrows
+from dubins_traffic.rules.exits import LaneOut, takes_lane
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.rules.shape import half_across
+from dubins_traffic.rules.tables import GRAIN
 
 MARGIN = 0.02
 """Distance that a car keeps from a disc that it may not enter, metres."""
@@ -50,8 +50,9 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
 
     It is negative if the car can't leave the disc. The cars in the lane are assumed to drive on until they stand close
     behind one another: behind a body that stands there now, behind an obstacle or before the next disc. A car that
-    drives in the next disc has left the lane. The ego may not drive on; at a crossing, where a car whose exit is barred
-    has to take another in time, it may even back up. `inside` cars are still in the disc and will be before this one.
+    drives in the next disc has left the lane. The ego and `free` cars may not drive on; at a crossing, where a car
+    whose exit is barred has to take another in time, they may even back up. `inside` cars are still in the disc and
+    will be before this one.
     """
     state, labels, roads, drivers, scratch = (
         traffic.state,
@@ -74,7 +75,8 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
         j = scratch.head[out >> 1]
         while j >= 0:
             along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
-            gone = labels.at[b, j] == end and labels.bits[b, j] & FLAG.STANDS == 0 and (j != EGO or n == EGO)
+            strange = n != EGO and (j == EGO or drivers.car[b, j].whims != 0)
+            gone = labels.at[b, j] == end and labels.bits[b, j] & FLAG.STANDS == 0 and not strange
             if j != n and not gone and takes_room(b, j, out, start, along, aside, labels, vehicle):
                 if look == 1:
                     last -= pitch if along < wall else 0.0
@@ -83,8 +85,8 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
                 heading = state.c[b, j] * tx + state.s[b, j] * ty
                 if is_slow(b, j, heading, state) and along < mouth + pitch:
                     return -1.0
-                if labels.bits[b, j] & FLAG.STANDS != 0 or heading < 0.0 or (j == EGO and n != EGO):
-                    back = vehicle.backs_up if j == EGO and n != EGO and crossing else 0.0
+                if labels.bits[b, j] & FLAG.STANDS != 0 or heading < 0.0 or strange:
+                    back = vehicle.backs_up if strange and crossing else 0.0
                     wall = min(wall, along)
                     last = min(last, along - back - pitch)
             j = scratch.link[j]
@@ -151,17 +153,34 @@ def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
 
 @jit_rare
 def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
-    """Tell whether the exit into the lane `out` is free (E4): no car takes the lane near the disc at its beginning."""
-    state, roads, drivers, scratch = traffic.state, traffic.roads, traffic.drivers, traffic.scratch
+    """Tell whether the exit into the lane `out` is free (E4): no car takes the lane near the disc at its beginning.
+
+    Outside the disc that is as the referee has it. Who is in it and nearest to that road counts as in the lane, too.
+    """
+    state, labels, roads, drivers, scratch = (
+        traffic.state,
+        traffic.labels,
+        traffic.roads,
+        traffic.drivers,
+        traffic.scratch,
+    )
     net, vehicle = drivers.net[b], drivers.vehicle[b]
-    tx, ty = lane_direction(roads, net, out)
+    start = lane_start(roads, net, out)
+    corner = roads.vertex[int(roads.vert_off[net]) + start]
+    far = vehicle.disc + vehicle.exit_room + GRAIN
+    lane = LaneOut(int(net), out, 2.0 * vehicle.middle, vehicle.needed)
     j = scratch.head[out >> 1]
     while j >= 0:
-        along, aside = lane_coordinates(roads, net, out, float(state.x[b, j]), float(state.y[b, j]))
-        half = half_across(b, j, tx, ty, state, vehicle)
-        takes = aside <= 0.0 and traffic.labels.lane[b, j] != out ^ 1
-        takes = takes or narrows(aside - half, aside + half, 2.0 * vehicle.middle, vehicle.needed)
-        if j != n and takes and along <= vehicle.disc + vehicle.exit_room:
+        x, y = float(state.x[b, j]), float(state.y[b, j])
+        along, aside = lane_coordinates(roads, net, out, x, y)
+        dx, dy = x - corner.x, y - corner.y
+        if j == n or dx * dx + dy * dy > far * far:
+            takes = False
+        elif labels.at[b, j] == start:
+            takes = aside <= 0.0
+        else:
+            takes = takes_lane(b, j, along, aside, lane, vehicle, state, labels, roads)
+        if takes:
             return False
         j = scratch.link[j]
     return True

@@ -104,6 +104,8 @@ class Driver:
     """For how long it parks at most, seconds."""
     departs: float
     """For how long from the beginning it parks, seconds."""
+    whims: int
+    """1 if it does as it likes, as far as the law allows (kind `free`), so that others can't rely on its driving on."""
     place: int = -1
     """The row of `Drivers.stage` it is at, -1: none."""
     goal: int = -1
