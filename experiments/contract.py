@@ -117,11 +117,9 @@ def row(name: str, found: Found) -> Row:
     kinds = ", ".join(sorted(found.cases))
     told = f"{found.violated:,}" + (f" ({kinds})" if kinds else "")
     more = f"; {found.discarded:,} in which somebody broke a rule before the ego did"
-    bar = "0" if own.bar else ""
-    return Row(
-        f"{own.says}, {found.trials:,} searched: {HAPPENS[own.target]}", told + more, bar,
-        not own.bar or not found.violated,
-    )  # fmt: skip
+    bar = f"0 of {TRIALS:,}" if own.bar else ""
+    met = not own.bar or (not found.violated and found.trials >= TRIALS)
+    return Row(f"{own.says}, {found.trials:,} searched: {HAPPENS[own.target]}", told + more, bar, met)
 
 
 def rows(
