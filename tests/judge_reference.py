@@ -261,7 +261,8 @@ class Judge:
         for other in self.cars:
             its = self.past[k][other]
             follows = other == 0 and not its["stands"]
-            self.fired["the ego stands behind"] += other == 0 and its["stands"] and its["progress"] < here
+            near = here - reach <= its["progress"] < here and its["lane"] == facts["lane"]
+            self.fired["the ego stands behind"] += other == 0 and near and its["stands"]
             rear = here - reach if follows else here
             behind = its["lane"] == facts["lane"] and its["progress"] < rear and not its["left"]
             there = its["segment"] == lane[0] and not behind

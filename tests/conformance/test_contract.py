@@ -31,10 +31,9 @@ FELL = {
 }
 """Trials beyond the first ones in which the bar once did not hold."""
 SECONDS = 300.0 if FULL else None
-BLOCKS = {
-    "before_obstacle": "a car before an obstacle is excused while the ego stands close behind it",
-}
-"""Scenes in which e-agents that break nothing still block the ego, round a ring in no trial of the short run."""
+BLOCKS = {"before_obstacle": {9}}
+"""Trials in which e-agents that break nothing still block the ego: an obstacle near the disc at the lane's end excuses
+who stands before it, for ever, though there is room to pass it and return."""
 
 
 def _came(name: str) -> list[Came]:
@@ -46,17 +45,11 @@ def _came(name: str) -> list[Came]:
         return list(pool.map(partial(trial, name, seconds=SECONDS), numbers))
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(name, marks=pytest.mark.xfail(reason=BLOCKS[name])) if name in BLOCKS else name
-        for name in BLOCKING
-    ],
-)
+@pytest.mark.parametrize("name", list(BLOCKING))
 def test_who_blocks_the_ego_breaks_a_rule(name: str) -> None:
     came = _came(name)
     assert [one for one in came if one.own] == []
-    assert [one for one in came if one.waited > one.bound] == []
+    assert {one.number for one in came if one.waited > one.bound} <= BLOCKS.get(name, set())
 
 
 @pytest.mark.parametrize("name", list(PROVOKING))

@@ -9,6 +9,7 @@ import pytest
 
 from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
 from dubins_traffic.roads.network import RoadNetwork
+from tests.judge_reference import Judge
 from tests.judging import (
     EASED,
     EPS,
@@ -418,7 +419,9 @@ def test_e5_an_obstacle_excuses_who_may_lack_room_to_pass_it() -> None:
         if follows is not None:
             for k, frame in enumerate(script):
                 frame[0] = on_lane(roads, lane, 1.25 + 0.1 * k * follows, -0.3)
-        return said(judged(replace(trial, problem=problem), script))
+        told = said(judged(replace(trial, problem=problem), script))
+        assert set(told) == Judge(replace(trial, problem=problem), script).breaches()
+        return told
 
     elsewhere = on_lane(roads, lanes_in(roads)[1], 1.6, -0.3)
     late = [("E5", 1, 30, 0)]

@@ -77,28 +77,24 @@ class LaneOut(NamedTuple):
 
 @jit
 def takes_lane(
-    b: int,
-    k: int,
-    along: float,
-    lateral: float,
-    out: LaneOut,
-    body: Shape,
-    state: State,
-    labels: Labels,
-    roads: RoadTable,
+    b: int, k: int, out: LaneOut, body: Shape, state: State, labels: Labels, roads: RoadTable
 ) -> bool:
-    """Tell whether car k, whose centre is outside the disc at the beginning of a lane and near it, takes that lane.
+    """Tell whether car `k` (index), whose centre is outside the disc at the beginning of a lane, takes that lane.
 
-    `along` (m) and `lateral` (m) are its coordinates there. Its `body` narrows the lane, or its centre is in it and the
-    car does not go toward the disc. The referee asks this of the lane `out`, and so do drivers.
+    The car, whose `body` (m) is given, is near that disc. Its body narrows the lane, or its centre is in it and the car
+    does not go toward the disc. The referee asks this of the lane `out`, and so do drivers.
 
     Norm: docs/rules.md#takes.
     """
-    if labels.segment[b, k] != out.lane // 2 or along <= 0.0:
+    if labels.segment[b, k] != out.lane // 2:
+        return False
+    x, y = state.x[b, k], state.y[b, k]
+    along, lateral = lane_coordinates(roads, out.net, out.lane, x, y)
+    if along <= 0.0:
         return False
     if labels.lane[b, k] != out.lane ^ 1 and -out.width - GRAIN <= lateral <= GRAIN:
         return True
-    tx, ty = lane_direction_at(roads, out.net, out.lane, state.x[b, k], state.y[b, k])
+    tx, ty = lane_direction_at(roads, out.net, out.lane, x, y)
     half = half_across(b, k, tx, ty, state, body)
     return narrows(lateral - half, lateral + half, out.width, out.needed + GRAIN)
 
@@ -161,14 +157,14 @@ def taken_exits(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables
     taken = 0
     for arm in range(t.degree[row]):
         lane = t.arms[row, arm]
-        along, lateral = lane_coordinates(t, net, lane, x, y)
         if inside:
+            along, lateral = lane_coordinates(t, net, lane, x, y)
             from_x, from_y = lane_coordinates(t, net, lane, state.x[b, n], state.y[b, n])
             way = to_mouth(from_x, from_y, own, terms)
             in_the_way = to_mouth(along, lateral, own, terms) < way + GRAIN
         else:
             out = LaneOut(net, lane, own.lane_width, own.free_needed)
-            in_the_way = takes_lane(b, k, along, lateral, out, own, state, tables.labels, t)
+            in_the_way = takes_lane(b, k, out, own, state, tables.labels, t)
         if in_the_way:
             taken |= 1 << arm
     return taken

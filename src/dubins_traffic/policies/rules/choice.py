@@ -112,7 +112,7 @@ def take_last_resort(b: int, n: int, traffic: Traffic) -> bool:
 def take_way_on(b: int, n: int, full: bool, traffic: Traffic) -> bool:
     """Choose the way on, even if it is barred beyond, for a car that would turn round in a bend; tell whether it does.
 
-    It takes no exit that is not free (E4), unless it may be `full`.
+    It takes no exit that is not free (E4), unless `full` (yes or no) says that it may be full.
     """
     roads, drivers = traffic.roads, traffic.drivers
     net = drivers.net[b]

@@ -172,14 +172,14 @@ def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
     j = scratch.head[out >> 1]
     while j >= 0:
         x, y = float(state.x[b, j]), float(state.y[b, j])
-        along, aside = lane_coordinates(roads, net, out, x, y)
         dx, dy = x - corner.x, y - corner.y
         if j == n or dx * dx + dy * dy > far * far:
             takes = False
         elif labels.at[b, j] == start:
+            _, aside = lane_coordinates(roads, net, out, x, y)
             takes = aside <= 0.0
         else:
-            takes = takes_lane(b, j, along, aside, lane, vehicle, state, labels, roads)
+            takes = takes_lane(b, int(j), lane, vehicle, state, labels, roads)
         if takes:
             return False
         j = scratch.link[j]
