@@ -250,7 +250,7 @@ def drivers(trials: int, folder: Path) -> list[Row]:
 def _searched(controller: str, strategy: str, trials: int, folder: Path) -> Found:
     """Return what a search finds that goes on where an earlier one of the same code was interrupted."""
     place = folder / f"falsify-{code_of_searches()}" / f"{controller}-{strategy}"
-    return falsify(WORLD, controller, place, trials=trials, seed=1, strategy=strategy, resume=True)
+    return falsify(WORLD, controller, place, trials=trials, seed=1, strategy=strategy, resume=place.exists())
 
 
 def _told(found: Found) -> str:

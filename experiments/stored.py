@@ -79,6 +79,23 @@ CLAIMS: Mapping[str, Claim] = {
         "falsify.md#how-soon",
         "hours",
     ),
+    "conformance": Claim(
+        "who keeps an ego waiting beyond the bound breaks a rule, and no clean ego brings a lawful car to a breach, in "
+        "scenes that try it",
+        "theory.md#on-the-road",
+        "a quarter of an hour",
+    ),
+    "contract": Claim(
+        "who keeps E1 to E6 keeps no ego waiting for ever, and no clean ego brings a lawful car to a breach, as far as "
+        "searches tell",
+        "falsify.md#both-sides-of-the-contract",
+        "days; what is interrupted goes on",
+    ),
+    "planted": Claim(
+        "holes that are planted in the norm are found within 20,000 trials",
+        "falsify.md#both-sides-of-the-contract",
+        "some minutes",
+    ),
     "shrinking": Claim(
         "a case that has been shrunk has at most three cars, and loses its breach with any one thing less",
         "falsify.md#what-is-promised-and-what-not",

@@ -118,6 +118,15 @@ def test_a_genome_comes_back_from_json_and_builds_the_same_instance() -> None:
     assert {agent.kind for agent in source.build([genome])[0].e_agents} == {"chosen"}
 
 
+def test_two_trials_of_one_genome_are_two_instances() -> None:
+    """Where nothing is left to choose, a child may equal its parent: what came of the two is told apart."""
+    source = Source(prepared(JUNCTION, 15.0, {}), 3, frees=False)
+    genome = source.fresh(5)
+    one, other = source.build([genome, genome])
+    assert one == other
+    assert one is not other
+
+
 def test_a_folder_holds_one_search(tmp_path: Path) -> None:
     with opened(tmp_path / "a", {"seed": 1}, resume=False) as archive:
         archive.remember({"settings": {"seed": 1}})

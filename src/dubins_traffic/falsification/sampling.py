@@ -171,9 +171,10 @@ def _freed(agent: EAgent) -> EAgent:
 
 
 def _built(base: Instance, genome: Genome) -> Instance:
+    """Return the instance of a genome, one of its own even where it changes nothing: trials are told apart by it."""
     if genome.tables or genome.starts:
         base = choices.with_choices(base, genome.tables, genome.starts or None)
-    return whims.with_whims(base, genome.whims) if genome.whims else base
+    return whims.with_whims(base, genome.whims) if genome.whims else replace(base)
 
 
 def _legs(instance: Instance) -> int:

@@ -1,0 +1,139 @@
+"""The scenes of the contract at length: who blocks the ego breaks a rule, and no clean ego provokes a lawful car.
+
+    python -m experiments conformance
+    python -m experiments.conformance [--trials N] [--jobs J] [--seconds S] [--store]
+
+The scenes of `tests.contract_scenes` are run 300 s each, all of them by turns, on grids, random and bent networks, with
+three bodies, at 10 and 30 Hz: 2,000 trials unless said otherwise. What came of each is a line of a file below
+`build/conformance`, which is of the sources, so an interrupted run goes on; after S seconds no trial begins. With
+--store the trials so far are kept as the result of the experiment.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import json
+import time
+from collections.abc import Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from dataclasses import asdict
+from pathlib import Path
+from typing import Final
+
+from benchmarks.table import Row, show
+from tests.contract_blocking import BLOCKING
+from tests.contract_provoking import PROVOKING
+from tests.contract_scenes import SCENES, Came, trial
+
+import dubins_traffic
+from experiments.stored import store, write_page
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+FOLDER: Final = ROOT / "build" / "conformance"
+TRIALS, SECONDS, JOBS = 2000, 300.0, 2
+
+
+def code() -> str:
+    """Return a digest of the package's sources and of the scenes."""
+    files = [*Path(dubins_traffic.__file__).parent.rglob("*.py"), *(ROOT / "tests").glob("contract_*.py")]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()[:16]
+
+
+def scene(place: int) -> tuple[str, int]:
+    """Return which scene a trial shows, and its variation."""
+    names = list(SCENES)
+    return names[place % len(names)], place // len(names)
+
+
+def known(file: Path) -> dict[tuple[str, int], Came]:
+    """Return what a file says of trials, by scene and variation."""
+    found: dict[tuple[str, int], Came] = {}
+    for line in file.read_text().splitlines() if file.exists() else []:
+        row = json.loads(line)
+        own = Came(**{**row, "own": tuple(row["own"]), "others": tuple(row["others"])})
+        found[own.name, own.number] = own
+    return found
+
+
+def came(trials: int = TRIALS, jobs: int = JOBS, seconds: float | None = None) -> list[Came]:
+    """Run the trials that no file tells of, in `jobs` processes, for some seconds; return all that are known."""
+    file = FOLDER / f"{code()}.jsonl"
+    file.parent.mkdir(parents=True, exist_ok=True)
+    places = [scene(place) for place in range(trials)]
+    found = known(file)
+    left = iter([place for place in places if place not in found])
+    end = time.monotonic() + (seconds if seconds is not None else float("inf"))
+    under_way: set[Future[Came]] = set()
+    with ProcessPoolExecutor(jobs) as pool, file.open("a") as out:
+        while True:
+            while len(under_way) < 2 * jobs and time.monotonic() < end:
+                place = next(left, None)
+                if place is None:
+                    break
+                under_way.add(pool.submit(trial, *place, SECONDS))
+            if not under_way:
+                break
+            done, under_way = wait(under_way, return_when=FIRST_COMPLETED)
+            for own in (future.result() for future in done):
+                found[own.name, own.number] = own
+                out.write(json.dumps(asdict(own)) + "\n")
+                out.flush()
+                if failed(own):
+                    print(own, flush=True)
+    return [found[place] for place in places if place in found]
+
+
+def failed(own: Came) -> bool:
+    """Tell whether a trial misses its bar."""
+    if own.name in BLOCKING:
+        return bool(own.own) or own.waited > own.bound
+    return bool(own.others) and not own.own
+
+
+def bars(found: Sequence[Came]) -> list[Row]:
+    """Return the table of the bars."""
+    rows: list[Row] = []
+    blocking = [own for own in found if own.name in BLOCKING]
+    provoking = [own for own in found if own.name in PROVOKING and not own.own]
+    for name, own, says in (
+        ("who blocks", blocking, "the ego waits longer than the bound, or breaks a rule first"),
+        ("who provokes", provoking, "a lawful car breaks a rule"),
+    ):
+        missed = [one for one in own if failed(one)]
+        scenes = ", ".join(sorted({one.name for one in missed}))
+        told = f"{len(missed)}" + (f" ({scenes})" if scenes else "")
+        rows.append(Row(f"{name}, {len(own):,} trials of {SECONDS:.0f} s: {says}", told, "0", not missed))
+    waits = [one.waited / one.bound for one in blocking if not failed(one)]
+    rows.append(
+        Row("longest wait of the others, share of its bound", f"{max(waits, default=0.0):.2f}", "", True)
+    )
+    unclean = sum(1 for own in found if own.name in PROVOKING and own.own)
+    rows.append(
+        Row("trials that do not count: who is to provoke breaks a rule first", f"{unclean:,}", "", True)
+    )
+    return rows
+
+
+def measure() -> list[Row]:
+    """Run all trials and return the table of the bars."""
+    return bars(came())
+
+
+def main() -> int:
+    """Run what is asked for, and print the table."""
+    parser = argparse.ArgumentParser(prog="experiments.conformance")
+    parser.add_argument("--trials", type=int, default=TRIALS)
+    parser.add_argument("--jobs", type=int, default=JOBS)
+    parser.add_argument("--seconds", type=float)
+    parser.add_argument("--store", action="store_true")
+    asked = parser.parse_args()
+    rows = bars(came(asked.trials, asked.jobs, asked.seconds))
+    if asked.store:
+        store("conformance", rows)
+        write_page()
+    return 0 if show("conformance", rows) else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

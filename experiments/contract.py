@@ -1,0 +1,155 @@
+"""Both sides of the contract, searched for a million trials each: who keeps E1 to E6 and blocks, who is provoked?
+
+    python -m experiments contract
+    python -m experiments.contract [--trials N] [--seconds S] [--searches NAME,...] [--workers W] [--store]
+
+`rules` and `lanes+shield` drive among `free` e-agents, which search through what E1 to E6 allow: in how many trials do
+they wait for a visit longer than the limit, though nobody has broken a rule? And an ego that is any program under the
+shield (`experiments.free_egos`) drives among `lawful` cars: in how many trials is one of these the first to break a
+rule? Each search ends after N trials, a million unless said otherwise, or S seconds, a day. Its folder below
+`build/contract` is of the package's sources; Ctrl-C keeps what is done, and the next call goes on. With --store the
+counts so far are kept as the result of the experiment, whatever the number of trials.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from benchmarks.table import Row, show
+
+import dubins_traffic
+from dubins_traffic.falsification.contract import BLOCKED, PROVOKED
+from dubins_traffic.falsification.found import Found
+from dubins_traffic.falsification.search import falsify
+from dubins_traffic.problem.configuration import Configuration
+from experiments.stored import store, write_page
+
+ROOT: Final = Path(__file__).resolve().parents[1]
+FOLDER: Final = ROOT / "build" / "contract"
+TRIALS: Final = 1_000_000
+DAY: Final = 86_400.0
+SEED: Final = 1
+
+
+def world(grid: tuple[int, int], length: float, agents: list[dict[str, Any]], **more: Any) -> dict[str, Any]:
+    """Return the configuration of a grid with two goals two segments apart, at 10 Hz."""
+    return {
+        "version": 1, "problem_domain": "dubins_traffic", "rate": 10, "rules": True, "number_goals_bounds": [2, 2],
+        "network": {"grid": {"rows": grid[0], "columns": grid[1], "length": length}}, "goal_segments_apart": 2,
+        "e-agents": agents,
+    } | more  # fmt: skip
+
+
+FREE: Final = [{"type": "free", "name": "free", "count": 2}]
+WAITING: Final = world((2, 2), 3.5, FREE, rules={"gap_rounds": 24.0}, duration=600)
+PROVOKING: Final = world((2, 3), 4.0, [{"type": "lawful", "name": "lawful", "count": 4}], duration=120)
+AMONG_FREE: Final = world(
+    (2, 3), 4.0, [*FREE, {"type": "lawful", "name": "lawful"}], rules={"gap_rounds": 4.0}, duration=120
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """A search: who drives, in which configuration, what is looked for, in words, and whether none is the bar."""
+
+    controller: str
+    world: dict[str, Any]
+    target: str
+    says: str
+    bar: bool = True
+
+
+SEARCHES: Final = {
+    "rules": Wanted(
+        "rules", WAITING, BLOCKED, "`rules` between two free cars on a ring of four bends, trials of 600 s"
+    ),
+    "lanes": Wanted("lanes+shield", WAITING, BLOCKED, "`lanes+shield`, the same"),
+    "egos": Wanted(
+        "experiments.free_egos:Free", PROVOKING, PROVOKED,
+        "any program under the shield among four lawful cars, trials of 120 s",
+    ),
+    "among-free": Wanted(
+        "rules", AMONG_FREE, PROVOKED, "`rules` among two free cars and a lawful one, trials of 120 s", bar=False
+    ),
+}  # fmt: skip
+"""The searches by name. The last one measures what the norm does not claim: lawful cars among free ones."""
+HAPPENS: Final = {
+    BLOCKED: "without a visit for longer than may be, though nobody has broken a rule",
+    PROVOKED: "a lawful car is the first to break a rule",
+}
+
+
+def code() -> str:
+    """Return a digest of the package's sources and of the egos that are searched."""
+    package = Path(dubins_traffic.__file__).parent
+    files = [
+        *sorted(package.rglob("*.py")),
+        ROOT / "experiments" / "free_egos.py",
+        ROOT / "tests" / "mutated.py",
+    ]
+    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
+
+
+def searched(name: str, trials: int = TRIALS, seconds: float = DAY, workers: int = 1) -> Found:
+    """Search, or go on where an earlier search of the same sources ended, and return what has been found."""
+    own, folder = SEARCHES[name], FOLDER / code() / name
+    began = time.monotonic()
+    found = falsify(
+        Configuration.from_document(own.world), own.controller, folder, rules=[own.target], trials=trials,
+        seconds=seconds, seed=SEED, duration=None, workers=workers, resume=folder.exists(),
+    )  # fmt: skip
+    took = time.monotonic() - began
+    print(f"{name}: {found.trials:,} trials, {found.violated} found, {took:.0f} s", flush=True)
+    for case in found.cases.values():
+        print(f"  {case.story.sentence}", flush=True)
+    return found
+
+
+def row(name: str, found: Found) -> Row:
+    """Return the row of a search."""
+    own = SEARCHES[name]
+    kinds = ", ".join(sorted(found.cases))
+    told = f"{found.violated:,}" + (f" ({kinds})" if kinds else "")
+    more = f"; {found.discarded:,} in which somebody broke a rule before the ego did"
+    bar = f"0 of {TRIALS:,}" if own.bar else ""
+    met = not own.bar or (not found.violated and found.trials >= TRIALS)
+    return Row(f"{own.says}, {found.trials:,} searched: {HAPPENS[own.target]}", told + more, bar, met)
+
+
+def rows(
+    names: tuple[str, ...] = tuple(SEARCHES), trials: int = TRIALS, seconds: float = DAY, workers: int = 1
+) -> Iterator[Row]:
+    """Yield the rows of searches."""
+    for name in names:
+        yield row(name, searched(name, trials, seconds, workers))
+
+
+def measure() -> list[Row]:
+    """Return the rows of this experiment."""
+    return list(rows())
+
+
+def main() -> int:
+    """Search as asked, and print the table."""
+    parser = argparse.ArgumentParser(prog="experiments.contract")
+    parser.add_argument("--trials", type=int, default=TRIALS)
+    parser.add_argument("--seconds", type=float, default=DAY)
+    parser.add_argument("--searches", default=",".join(SEARCHES), metavar="NAME,...")
+    parser.add_argument("--workers", type=int, default=1)
+    parser.add_argument("--store", action="store_true")
+    asked = parser.parse_args()
+    found = list(rows(tuple(asked.searches.split(",")), asked.trials, asked.seconds, asked.workers))
+    if asked.store:
+        store("contract", found)
+        write_page()
+    return 0 if show("contract", found) else 1
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
