@@ -4,6 +4,7 @@ from __future__ import annotations
 
 TUTORIALS = (
     "tutorials/first-controller",
+    "tutorials/lane-keeper",
     "tutorials/reading-a-verdict",
     "tutorials/campaign",
     "tutorials/ros",

@@ -8,7 +8,11 @@ import typer
 
 from dubins_traffic.cli import options
 
-EXAMPLES = options.examples("replay out/trial-0000.mcap", "replay out/trial-0000.mcap -o trial.html")
+EXAMPLES = options.examples(
+    "replay out/trial-0000.mcap",
+    "replay out/trial-0000.mcap -o trial.html",
+    "replay out/trial-0000.mcap --at 12.5",
+)
 
 
 def replay(
@@ -16,6 +20,12 @@ def replay(
     output: Annotated[
         str | None,
         typer.Option("--output", "-o", metavar="FILE.html", help="The page.", show_default="RECORD.html"),
+    ] = None,
+    at: Annotated[
+        float | None,
+        typer.Option(
+            "--at", metavar="S", help="The second at which the page begins.", show_default="its first"
+        ),
     ] = None,
     overwrite: options.Replace = False,
 ) -> None:
@@ -40,5 +50,6 @@ def replay(
         formula_marks(scored.formulas),
         scored.verdict,
         overwrite=overwrite,
+        at=at,
     )
     options.tell(output)
