@@ -28,7 +28,9 @@ def scores(configuration: str, controller: str, trials: int) -> tuple[dt.Score, 
     return plan.conclude(dt.run_trials(plan.jobs)).trials
 
 
-@pytest.mark.parametrize("trials", [FEW, pytest.param(TRIALS, marks=pytest.mark.long)])
+@pytest.mark.parametrize(
+    "trials", [pytest.param(FEW, marks=pytest.mark.path), pytest.param(TRIALS, marks=pytest.mark.long)]
+)
 def test_it_makes_a_counted_round_in_junction(trials: int) -> None:
     counted = [score.counted_rounds for score in scores("junction", KEEPER, trials)]
     assert sum(rounds > 0 for rounds in counted) >= trials / 2, counted

@@ -149,16 +149,18 @@ def _between(instance: Instance) -> None:
 
 
 def _navigated(instance: Instance) -> None:
-    """Ask what a driver asks where nothing tells the lane, before a crossing in a queue, and in a disc."""
-    navigator, pose = Navigator(instance.problem), instance.starts[EGO]
+    """Ask what a driver asks where nothing tells the lane, before a crossing in a queue, and in a disc, also at once."""
+    pose = instance.starts[EGO]
     lane = 0
     vertex = instance.problem.network.lane_ends(lane)[1]
     unknown = Propositions(0, NONE, NONE, NONE, 0)
     queued = Propositions(0, NONE, NONE, lane, FLAG.STOPPED)
     inside = Propositions(0, vertex, vertex, NONE, 0)
-    for tick, seen in enumerate((unknown, queued, inside)):
-        here = navigator.look(Observation(tick, 0.0, pose, Twist(0.0, 0.0), seen, (), None))
-        here.line(SECONDS)
+    for frames in ((unknown, queued, inside), (inside,)):
+        navigator = Navigator(instance.problem)
+        for tick, seen in enumerate(frames):
+            here = navigator.look(Observation(tick, 0.0, pose, Twist(0.0, 0.0), seen, (), None))
+            here.line(SECONDS)
 
 
 def _bend() -> None:
