@@ -149,7 +149,7 @@ def _between(instance: Instance) -> None:
 
 
 def _navigated(instance: Instance) -> None:
-    """Ask what a driver asks where nothing tells the lane, before a crossing in a queue, and in a disc, also at once."""
+    """Ask what a driver asks where nothing tells the lane, in a queue before a crossing, and in a disc, at once too."""
     pose = instance.starts[EGO]
     lane = 0
     vertex = instance.problem.network.lane_ends(lane)[1]
