@@ -304,7 +304,7 @@ def own(rule: str, time: float) -> Violation:
     return Violation(rule, "ego", time, round(30 * time), time, Place(0.0, 0.0, None, None))
 
 
-def judged(trial: int, *breaches: Violation, **changes: object) -> Score:
+def judged(trial: int, *breaches: Violation, **changes: Any) -> Score:
     return scored(trial, verdict=replace(verdict("violated"), violations=breaches), **changes)
 
 
