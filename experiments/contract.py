@@ -24,8 +24,8 @@ from typing import Any, Final
 from benchmarks.table import Row, show
 
 import dubins_traffic
+from dubins_traffic.falsification.archive import Found
 from dubins_traffic.falsification.contract import BLOCKED, PROVOKED
-from dubins_traffic.falsification.found import Found
 from dubins_traffic.falsification.search import falsify
 from dubins_traffic.problem.configuration import Configuration
 from experiments.stored import store, write_page

@@ -22,7 +22,10 @@ GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
     "trials": ("Trials", ("run_trial", "Trial", "Result", "run_trials", "Job", "Plan", "plan", "End", "Ending")),
     "driving": (
         "Controllers, and what they see",
-        ("Controller", "Observation", "SensedCar", "Pose", "Twist", "Command", "Contact", "Shield"),
+        (
+            "Controller", "Observation", "Propositions", "SensedCar", "Pose", "Twist", "Command", "Contact",
+            "Navigator", "Situation", "Shield",
+        ),
     ),
     "batches": ("Batches", ("run_batch", "Batch")),
     "campaigns": ("Campaigns", ("run_campaign", "CampaignResults", "load_results")),

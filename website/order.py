@@ -9,6 +9,7 @@ from __future__ import annotations
 SECTIONS: dict[str, tuple[str, ...]] = {
     "Start": (
         "tutorials/first-controller",
+        "tutorials/lane-keeper",
         "tutorials/reading-a-verdict",
         "tour",
         "python",
@@ -41,6 +42,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
 """Heading of the sidebar: its pages."""
 LABELS: dict[str, str] = {
     "tutorials/first-controller": "Tutorial: first controller",
+    "tutorials/lane-keeper": "Tutorial: a lane keeper",
     "tutorials/reading-a-verdict": "Tutorial: reading a verdict",
     "tutorials/ros": "Tutorial: ROS",
     "tutorials/synthesis": "Tutorial: synthesis",

@@ -16,7 +16,17 @@ if TYPE_CHECKING:  # without the module `typing`: the program `dubins-traffic` h
     from dubins_traffic.campaign.results import CampaignResults, load_results
     from dubins_traffic.campaign.run_campaign import run_campaign
     from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
-    from dubins_traffic.cars.state import Command, Contact, Frames, Observation, Pose, SensedCar, Twist
+    from dubins_traffic.cars.state import (
+        Command,
+        Contact,
+        Frames,
+        Observation,
+        Pose,
+        Propositions,
+        SensedCar,
+        Twist,
+    )
+    from dubins_traffic.controllers.navigator import Navigator, Situation
     from dubins_traffic.controllers.shield import Shield
     from dubins_traffic.engine.batch import Batch, run_batch
     from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError, RecordError
@@ -56,7 +66,17 @@ _PLACES = {
     "runs.single": ("Result", "Trial", "run_trial"),
     "runs.sources": ("load", "load_record"),
     "cars.body": ("Bounds", "Car", "Disc", "DiscObstacle", "PolygonObstacle", "Rectangle"),
-    "cars.state": ("Command", "Contact", "Frames", "Observation", "Pose", "SensedCar", "Twist"),
+    "cars.state": (
+        "Command",
+        "Contact",
+        "Frames",
+        "Observation",
+        "Pose",
+        "Propositions",
+        "SensedCar",
+        "Twist",
+    ),
+    "controllers.navigator": ("Navigator", "Situation"),
     "controllers.shield": ("Shield",),
     "falsification.estimate": ("estimate",),
     "falsification.regress": ("regress",),
@@ -115,11 +135,13 @@ __all__ = [
     "Job",
     "Judging",
     "Metric",
+    "Navigator",
     "Observation",
     "Plan",
     "PolygonObstacle",
     "Pose",
     "Problem",
+    "Propositions",
     "Record",
     "RecordError",
     "RecordWriter",
@@ -133,6 +155,7 @@ __all__ = [
     "Shield",
     "Simulator",
     "Sink",
+    "Situation",
     "Trial",
     "Twist",
     "Verdict",

@@ -26,7 +26,7 @@ _ARGUMENTS: Final = {
     **{
         f"--{name}": name
         for name in (
-            "assume", "cars", "clock", "controller", "deadline", "event", "factor", "keep",
+            "assume", "at", "cars", "clock", "controller", "deadline", "event", "factor", "keep",
             "master", "memory", "method", "poses", "ray", "records", "remote", "repeat",
             "rnd", "seed", "simulator", "strategy", "trials", "url", "workers",
         )

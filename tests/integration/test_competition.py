@@ -24,7 +24,7 @@ from dubins_traffic.competition.judging import RESULTS, FramesHash, Judged, eval
 from dubins_traffic.competition.ranking import rank
 from dubins_traffic.competition.sealing import seal
 from dubins_traffic.competition.submission import Submission, check_submission
-from dubins_traffic.competition.templates import write_template
+from dubins_traffic.competition.templates import template_files, write_template
 from dubins_traffic.competition.visibility import SubmissionState, visible
 from dubins_traffic.errors import InputError
 from dubins_traffic.runs.single import run_trial
@@ -274,9 +274,10 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
 
 @needs_boxes
 @pytest.mark.tools
-def test_the_templates_pass_as_they_are_and_drive_alike(tmp_path: Path) -> None:
+def test_the_template_of_a_program_passes_as_it_is_and_drives_like_a_module(tmp_path: Path) -> None:
     need_compiler()
-    write_template("python", tmp_path / "python")
+    (tmp_path / "python").mkdir()
+    (tmp_path / "python" / "controller.py").write_text(CONTROLLERS["waits"])
     write_template("cpp", tmp_path / "cpp")
     subprocess.run(
         ["make", "-s", "CXXFLAGS=-std=c++17 -Wall -Wextra -Werror"], cwd=tmp_path / "cpp", check=True
@@ -291,6 +292,26 @@ def test_the_templates_pass_as_they_are_and_drive_alike(tmp_path: Path) -> None:
     assert {(own.end, own.owner, own.log) for one in found for own in one.results} == {
         ("duration", None, "2 goals")
     }
+
+
+@needs_boxes
+def test_the_template_in_python_has_counted_rounds_as_it_is(tmp_path: Path) -> None:
+    """In most trials of the practice phase of the competition in the repository, in its box."""
+    write_template("python", tmp_path / "python")
+    phase = load_competition(ROOT / "examples" / "competition").phase("practice")
+    found = evaluate(phase, check_submission(tmp_path / "python", tmp_path / "store"), tmp_path / "out")
+    assert {(own.end, own.log) for own in found.results} == {("duration", "2 goals")}
+    counted = [own.row["counted_rounds"] for own in found.results]
+    assert sum(rounds > 0 for rounds in counted) > len(counted) / 2, counted
+
+
+def test_the_template_in_python_is_the_lane_keeper() -> None:
+    """But for its name, what is said above it, and the line that goes to the log."""
+    example = (ROOT / "examples" / "lane_keeper.py").read_text()
+    template = template_files("python")["controller.py"]
+    code = [line for line in template.splitlines() if line != "import sys" and "sys.stderr" not in line]
+    own = "\n".join(code).replace("class Controller", "class LaneKeeper")
+    assert own[own.index("from math") :].strip() == example[example.index("from math") :].strip()
 
 
 @needs_boxes

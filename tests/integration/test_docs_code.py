@@ -27,6 +27,7 @@ ELSEWHERE = {
     "learning-agents.md": "test_parallel_env.py",
     "tutorials/campaign.md": "test_stranger.py",
     "tutorials/first-controller.md": "test_stranger.py",
+    "tutorials/lane-keeper.md": "test_stranger.py",
     "tutorials/learning.md": "test_tutorials.py",
     "tutorials/reading-a-verdict.md": "test_stranger.py",
     "tutorials/synthesis.md": "test_tutorials.py",

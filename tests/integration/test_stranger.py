@@ -15,7 +15,7 @@ from tests.integration.test_tutorials import follow
 from tests.tools import interpreter_with
 
 PATIENCE_S = 1800.0
-STEPS = ("first-controller", "reading-a-verdict", "campaign")
+STEPS = ("first-controller", "lane-keeper", "reading-a-verdict", "campaign")
 """Tutorials on the path."""
 
 

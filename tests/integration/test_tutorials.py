@@ -15,7 +15,7 @@ from tests.integration.test_readme import FILE_NAME, ROOT, runnable
 
 TUTORIALS = ROOT / "docs" / "tutorials"
 RUN = ("synthesis", "learning")
-ELSEWHERE = ("first-controller", "reading-a-verdict", "campaign")
+ELSEWHERE = ("first-controller", "lane-keeper", "reading-a-verdict", "campaign")
 """Run by `test_stranger`, in an environment of its own."""
 FOLLOWED = ("ros", "competition")
 """Run by `test_docs_code`, with a ROS master and a service."""

@@ -15,7 +15,7 @@ from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report import worst, write
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.write import page
-from dubins_traffic.cli import tables
+from dubins_traffic.cli import costs, tables
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.roads.network import RoadNetwork
@@ -303,3 +303,28 @@ def test_the_page_of_a_report_says_that_its_verdicts_say_little(broken: int, tmp
         < text.index("<th>counted rounds</th>")
         < text.index("<th>satisfied</th>")
     )
+
+
+def own(rule: str, time: float) -> Violation:
+    return Violation(rule, "ego", time, round(30 * time), time, Place(0.0, 0.0, None, None))
+
+
+def judged(trial: int, *breaches: Violation, **changes: Any) -> Score:
+    return scored(trial, verdict=replace(verdict("violated"), violations=breaches), **changes)
+
+
+def test_below_the_table_stands_what_cost_most_and_where_to_look():
+    first = judged(0, own("3.stop", 2.0), BREACH, own("2.left", 9.0))
+    second = judged(1, own("3.clear", 1.0), own("2.left", 4.77), record="out/trial 1.mcap")
+    said, kept = costs.worst(ScoreSheet((first, second)))
+    assert said == "Cost most: 2.left, 2 times, first in trial 0 at 9.00 s."
+    assert "--records" in kept
+    said, see = costs.worst(ScoreSheet((second,)))
+    assert said == "Cost most: 3.clear, once, in trial 1 at 1.00 s."
+    assert see == "To see it: dubins-traffic replay 'out/trial 1.mcap' --at 0.00"
+
+
+def test_below_a_table_without_breaches_or_of_several_controllers_stands_nothing():
+    assert costs.worst(ScoreSheet((judged(0, BREACH),))) == []
+    several = judged(0, own("2.left", 1.0)), judged(0, own("2.left", 1.0), controller="simple")
+    assert costs.worst(ScoreSheet(several)) == []

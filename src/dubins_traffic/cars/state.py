@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 
 from dubins_traffic.cars.body import Body
+from dubins_traffic.cars.propositions import FLAG, names
 from dubins_traffic.kernels.angles import angles
 from dubins_traffic.kernels.arrays import Bits, Floats, Ints
 from dubins_traffic.kernels.tables import Tables
@@ -49,12 +50,53 @@ class Command(NamedTuple):
     yaw_rate: float
 
 
+class _Holds:
+    """A proposition of `Propositions` that is true or false: whether its flag is among the bits."""
+
+    def __init__(self, flag: int) -> None:
+        self._flag = flag
+
+    @overload
+    def __get__(self, own: None, kind: type) -> _Holds: ...
+
+    @overload
+    def __get__(self, own: Propositions, kind: type) -> bool: ...
+
+    def __get__(self, own: Propositions | None, kind: type) -> bool | _Holds:
+        """Return whether it is true of `own`."""
+        return self if own is None else own.bits & self._flag != 0
+
+
 class Propositions(NamedTuple):
     """The discrete state of one car at one frame (docs/rules.md#propositions).
 
     `segment` is the nearest segment; `at` the intersection whose disc holds the centre and `crosses` the one whose
     disc the body meets (-1: none); `lane` the lane state, 2 * segment + direction (-1: none); `bits` a union of
-    the flags in `dubins_traffic.rules.propositions`.
+    the flags in `dubins_traffic.rules.propositions`. Each of these flags has a name here too. The flags of the queue
+    are about the crossing at the end of the lane.
+
+    Attributes
+    ----------
+    on_road : bool
+        The centre is on a road.
+    approach, stopped : bool
+        It is foremost before the crossing and near its disc; it has stopped there and holds a ticket.
+    clear : bool
+        No other car crosses the crossing ahead; in a crossing: that one.
+    ahead, first : bool
+        It has stopped, and another car is before it in the order of arrival; or none is.
+    forfeited : bool
+        It has stopped, and got a new ticket in this wait.
+    blocked : bool
+        Something that stands ahead leaves too little of the right lane.
+    left, overtaking, hemmed : bool
+        It reaches over the centre line; it may, since something blocked its lane; it may have no way back yet.
+    still, stands, excused, lingers : bool
+        It has not moved; it stands in the way of others; it waits, so it does not; it has hardly got on for long.
+    in_crossing, entered : bool
+        The body meets the disc of a crossing; it came into a disc in this frame.
+    turned, breach3 : bool
+        It turned round outside discs in this frame; it is in a crossing that it entered against rule 3.
     """
 
     segment: int
@@ -62,6 +104,31 @@ class Propositions(NamedTuple):
     crosses: int
     lane: int
     bits: int
+
+    on_road = _Holds(FLAG.ON_ROAD)
+    still = _Holds(FLAG.STILL)
+    stands = _Holds(FLAG.STANDS)
+    left = _Holds(FLAG.LEFT)
+    overtaking = _Holds(FLAG.OVERTAKING)
+    blocked = _Holds(FLAG.BLOCKED)
+    approach = _Holds(FLAG.APPROACH)
+    stopped = _Holds(FLAG.STOPPED)
+    clear = _Holds(FLAG.CLEAR)
+    ahead = _Holds(FLAG.AHEAD)
+    in_crossing = _Holds(FLAG.IN_CROSSING)
+    breach3 = _Holds(FLAG.BREACH3)
+    first = _Holds(FLAG.FIRST)
+    forfeited = _Holds(FLAG.FORFEITED)
+    excused = _Holds(FLAG.EXCUSED)
+    turned = _Holds(FLAG.TURNED)
+    entered = _Holds(FLAG.ENTERED)
+    lingers = _Holds(FLAG.LINGERS)
+    hemmed = _Holds(FLAG.HEMMED)
+
+    def __repr__(self) -> str:
+        words = ", ".join(names(self.bits)) or "none"
+        places = f"segment={self.segment}, at={self.at}, crosses={self.crosses}, lane={self.lane}"
+        return f"<Propositions: {places}; {words}>"
 
 
 class SensedCar(NamedTuple):

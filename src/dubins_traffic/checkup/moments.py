@@ -14,11 +14,13 @@ import numpy as np
 
 from dubins_traffic.cars.body import DiscObstacle
 from dubins_traffic.cars.dynamics import BUILT_IN
-from dubins_traffic.cars.state import Observation, State
+from dubins_traffic.cars.propositions import FLAG
+from dubins_traffic.cars.state import EGO, NONE, Observation, Propositions, State, Twist
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.cars.touching import Bodies
 from dubins_traffic.checkup.scenarios import scenarios
 from dubins_traffic.controllers import registry as controllers
+from dubins_traffic.controllers.navigator import Navigator
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.engine.controlled import BatchView, LanesGroup, Maker
 from dubins_traffic.errors import InputError
@@ -75,6 +77,7 @@ def moments() -> Iterator[Callable[[], object]]:
     yield partial(_together, pair, _Watching)
     yield partial(_checked, town)
     yield partial(_between, town)
+    yield partial(_navigated, town)
     yield _bend
     for changes in _changes():
         yield partial(_drawn_and_run, changes)
@@ -142,6 +145,21 @@ def _between(instance: Instance) -> None:
     bodies = Bodies(instance.problem.car, [DiscObstacle(1.0, 1.0, 0.1)])
     for other in (1, -1):
         bodies.separation(State.zeros(1, 2), 0, other)
+
+
+def _navigated(instance: Instance) -> None:
+    """Ask what a driver asks where nothing tells the lane, in a queue before a crossing, and in a disc, at once too."""
+    pose = instance.starts[EGO]
+    lane = 0
+    vertex = instance.problem.network.lane_ends(lane)[1]
+    unknown = Propositions(0, NONE, NONE, NONE, 0)
+    queued = Propositions(0, NONE, NONE, lane, FLAG.STOPPED)
+    inside = Propositions(0, vertex, vertex, NONE, 0)
+    for frames in ((unknown, queued, inside), (inside,)):
+        navigator = Navigator(instance.problem)
+        for tick, seen in enumerate(frames):
+            here = navigator.look(Observation(tick, 0.0, pose, Twist(0.0, 0.0), seen, (), None))
+            here.line(SECONDS)
 
 
 def _bend() -> None:

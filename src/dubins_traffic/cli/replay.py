@@ -14,6 +14,7 @@ EXAMPLES = options.examples(
     "replay out/trial-0000.mcap",
     "replay out/trial-0000.mcap -o trial.html",
     "replay out/trial-0000.mcap -o trial.gif --speed 4 --to 60",
+    "replay out/trial-0000.mcap --at 12.5",
 )
 
 
@@ -66,6 +67,12 @@ def replay(
         int | None,
         typer.Option("--size", metavar="PIXELS", help="Longer side of a moving picture.", show_default="480"),
     ] = None,
+    at: Annotated[
+        float | None,
+        typer.Option(
+            "--at", metavar="S", help="The second at which the page begins.", show_default="its first"
+        ),
+    ] = None,
     overwrite: options.Replace = False,
 ) -> None:
     """Make a self-contained page that replays a trial in a browser, or a moving picture of it."""
@@ -107,8 +114,11 @@ def replay(
             formula_marks(scored.formulas),
             scored.verdict,
             overwrite=overwrite,
+            at=at,
         )
     else:
+        if at is not None:
+            raise InputError("of a page", field="--at", value=at, expected="--from for a moving picture")
         moving = Animation(
             found,
             fps=(VIDEO_FPS if suffix in CODECS else FPS) if fps is None else fps,

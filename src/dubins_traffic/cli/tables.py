@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
 from dubins_traffic.cli import faults
+from dubins_traffic.cli.costs import worst
 from dubins_traffic.errors import shown
 from dubins_traffic.scoring.notice import assumption_notice
 
@@ -130,6 +131,8 @@ def show(sheet: ScoreSheet, *, json: bool) -> None:
 
         console = Console()
         console.print(score_table(sheet, console.width))
+        for line in worst(sheet):
+            console.print(line, highlight=False, markup=False, soft_wrap=True)
         console.print(NOTE, style="dim", highlight=False, soft_wrap=True)
         if any(score.formulas for score in sheet.trials):
             console.print(formula_table(sheet))

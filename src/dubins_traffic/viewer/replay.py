@@ -65,6 +65,7 @@ def write_replay(
     verdict: Verdict | None = None,
     *,
     overwrite: bool = False,
+    at: float | None = None,
 ) -> None:
     """Write the page that replays a trial.
 
@@ -86,14 +87,17 @@ def write_replay(
         The verdict on the trial: its breaches are marked on the timeline and on the map, and what excused the ego.
     overwrite : bool
         Whether a page that is there may be replaced.
+    at : float, optional
+        The second of the trial that the page shows first; by default its first.
 
     Raises
     ------
     InputError
-        If there is no frame, `path` is refused (`files.require_output`), or the page can't be written.
+        If there is no frame, `at` is not within the trial, `path` is refused (`files.require_output`), or the page
+        can't be written.
     """
     require_output(path, "a page", PAGES, overwrite=overwrite)
-    text = replay_page(instance, frames, ending, summary, marks, verdict)
+    text = replay_page(instance, frames, ending, summary, marks, verdict, at)
     replace_file(Path(path), lambda draft: draft.write_text(text, encoding="utf-8", newline="\n"))
 
 
@@ -104,10 +108,15 @@ def replay_page(
     summary: Mapping[str, object] | None = None,
     marks: Sequence[Mark] = (),
     verdict: Verdict | None = None,
+    at: float | None = None,
 ) -> str:
     """Return the page that `write_replay` writes; equal arguments give equal text."""
     if len(frames) == 0:
         raise InputError("nothing to replay", field="frames", value=0, expected="at least one frame")
+    last = (frames.first + len(frames) - 1) / frames.rate
+    if at is not None and not frames.first / frames.rate <= at <= last:
+        expected = f"a second of the trial, from {frames.first / frames.rate:g} to {last:g}"
+        raise InputError("not in the trial", file="--at", value=at, expected=expected)
     title = f"Trial {instance.trial} of seed {instance.seed}"
     style = palette.style_sheet() + part("viewer/replay.css")
     scripts = [f"const LOOKS = {json.dumps(LOOKS)};", *(part(f"viewer/{name}") for name in SCRIPTS)]
@@ -115,6 +124,7 @@ def replay_page(
     breaches = [] if verdict is None else breach_marks(instance, verdict.violations)
     every = marks_of(instance, frames, [*marks, *breaches])
     document = _document(title, instance, frames, ending, summary or {}, every)
+    document |= {} if at is None else {"at": at}
     document["verdict"] = None if verdict is None else _verdict(instance, verdict, every)
     return render("viewer/replay.html", title=title, style=style, script=script, document=document)
 
