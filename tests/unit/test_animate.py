@@ -235,6 +235,8 @@ def test_the_command_takes_options_for_moving_pictures(
     assert "--to: outside the trial" in capsys.readouterr().err
     assert main(["replay", str(recorded), "-o", str(tmp_path / "x.html"), "--speed", "2"]) == 2
     assert "--speed: of a moving picture" in capsys.readouterr().err
+    assert main(["replay", str(recorded), "-o", str(tmp_path / "x.gif"), "--at", "2"]) == 2
+    assert "--at: of a page" in capsys.readouterr().err
     assert [path.name for path in tmp_path.iterdir()] == ["x.png"]
 
 

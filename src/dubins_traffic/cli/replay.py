@@ -102,6 +102,8 @@ def replay(
             if value is not None:
                 expected = "no such option for a page, which plays the whole trial at any speed"
                 raise InputError("of a moving picture", field=name, value=value, expected=expected)
+    elif at is not None:
+        raise InputError("of a page", field="--at", value=at, expected="--from for a moving picture")
     found = load_record(record)
     scored = score(found)
     if suffix not in SUFFIXES:
@@ -117,8 +119,6 @@ def replay(
             at=at,
         )
     else:
-        if at is not None:
-            raise InputError("of a page", field="--at", value=at, expected="--from for a moving picture")
         moving = Animation(
             found,
             fps=(VIDEO_FPS if suffix in CODECS else FPS) if fps is None else fps,
