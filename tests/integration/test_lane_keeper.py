@@ -95,7 +95,7 @@ def test_the_line_under_the_table_names_a_command_that_shows_the_breach(tmp_path
     page = (tmp_path / "kept here" / "trial-0000.html").read_text(encoding="utf-8")
     data = re.search(r'id="data">(.*?)</script>', page, re.DOTALL)
     assert data
-    assert json.loads(data[1])["at"] == pytest.approx(max(0.0, float(told[3]) - 1.0), abs=0.006)
+    assert json.loads(data[1])["begin"] == pytest.approx(max(0.0, float(told[3]) - 1.0), abs=0.006)
     late = subprocess.run(
         [*program, "replay", "kept here/trial-0000.mcap", "-o", "late.html", "--at", "1e9"],
         cwd=tmp_path, env=around, capture_output=True, text=True, check=False,

@@ -29,7 +29,7 @@ return at.map(([x, y]) => {
 });
 """
 """The colours at places of the world."""
-ROAD, LINE = (0xCD, 0xD1, 0xD7), (0xFF, 0xFF, 0xFF)
+ROAD, LINE = (0xCF, 0xD3, 0xD8), (0xFF, 0xFF, 0xFF)
 
 
 def inner(network: RoadNetwork, s: int, offset: float) -> np.ndarray:

@@ -86,6 +86,19 @@ def judged(
     assert browser.get_log("browser") == []
 
 
+def test_a_page_begins_at_the_second_that_it_is_told(
+    browser: webdriver.Chrome, trial: tuple[Instance, Frames], tmp_path: Path
+) -> None:
+    tried, frames = trial
+    write_replay(tmp_path / "late.html", tried, frames, None, at=12.5)
+    browser.get((tmp_path / "late.html").as_uri())
+    WebDriverWait(browser, 600).until(
+        lambda driver: driver.execute_script("return window.replay?.ready === true")
+    )
+    assert (ask(browser, "time"), ask(browser, "playing")) == (12.5, False)
+    assert browser.get_log("browser") == []
+
+
 def test_opens_and_shows_the_trial(page: webdriver.Chrome, trial: tuple[Instance, Frames]) -> None:
     tried, _ = trial
     assert page.title.startswith("Trial 2 of seed 7")

@@ -7,7 +7,7 @@ const KEY_PAN = 60;
 const VIEW_WIDTHS = 8;
 
 const trial = new Trial(JSON.parse(find("data").textContent));
-const state = { time: trial.at ?? trial.start, playing: false, chosen: 0, speed: 1, fitted: true, panelAt: 0, last: null };
+const state = { time: trial.begin ?? trial.start, playing: false, chosen: 0, speed: 1, fitted: true, panelAt: 0, last: null };
 const map = new MapView(find("map"), trial);
 const show = {};
 const marks = new Marks(trial);

@@ -124,7 +124,7 @@ def replay_page(
     breaches = [] if verdict is None else breach_marks(instance, verdict.violations)
     every = marks_of(instance, frames, [*marks, *breaches])
     document = _document(title, instance, frames, ending, summary or {}, every)
-    document |= {} if at is None else {"at": at}
+    document |= {} if at is None else {"begin": at}
     document["verdict"] = None if verdict is None else _verdict(instance, verdict, every)
     return render("viewer/replay.html", title=title, style=style, script=script, document=document)
 
