@@ -14,7 +14,7 @@ import pytest
 
 import dubins_traffic as dt
 from dubins_traffic.cars.state import Propositions
-from dubins_traffic.rules.propositions import FLAG, NAMES
+from dubins_traffic.rules.propositions import FLAG, NAMES, renews_ticket
 from dubins_traffic.transports.line_messages import observation_from_document, observation_to_document
 from tests.minute import a_minute
 
@@ -30,6 +30,25 @@ def test_propositions_show_names_and_no_bits() -> None:
     assert repr(seen) == "<Propositions: segment=3, at=-1, crosses=-1, lane=6; on_road, stopped>"
     assert repr(Propositions(3, -1, -1, 6, 0)).endswith("; none>")
     assert seen == (3, -1, -1, 6, FLAG.ON_ROAD | FLAG.STOPPED)
+
+
+WAITS, FIRST, AGAIN = FLAG.STOPPED | FLAG.AHEAD, FLAG.STOPPED | FLAG.FIRST, FLAG.FORFEITED
+
+
+@pytest.mark.parametrize(
+    ("before", "now", "renewed"),
+    [
+        (FIRST, WAITS | AGAIN, True),
+        (FIRST | AGAIN, WAITS | AGAIN, True),
+        (FIRST, FIRST | AGAIN, True),
+        (FIRST, WAITS, False),  # a car on the right has joined the group
+        (WAITS, FIRST, False),
+        (WAITS | AGAIN, FIRST | AGAIN, False),
+        (WAITS | AGAIN, WAITS | AGAIN, False),
+    ],
+)
+def test_another_ticket_shows_in_the_flags(before: int, now: int, renewed: bool) -> None:
+    assert renews_ticket(before, now) is renewed
 
 
 class Asks:

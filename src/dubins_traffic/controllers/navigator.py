@@ -20,7 +20,7 @@ from dubins_traffic.roads.table import RoadTable, pack
 from dubins_traffic.routing.lane_graph import lane_at, nearest_stage, place_on_lane
 from dubins_traffic.routing.rounds import stages
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.rules.propositions import FLAG, renews_ticket
 from dubins_traffic.rules.queue import Queue, rank_queue
 from dubins_traffic.rules.tables import CarMemory, ticks
 
@@ -280,11 +280,9 @@ class _Tickets:
         return tuple(sorted(cars, key=lambda car: self._rows[car.index].rank))
 
     def _note(self, index: int, now: Propositions, tick: int) -> None:
-        """Note a new ticket: the car has stopped, or was first and is not any more, or has forfeited its place."""
+        """Note a ticket that a car has got since the frame before."""
         before = self._bits.get(index, 0)
-        renewed = before & FLAG.FIRST and not now.bits & FLAG.FIRST
-        forfeited = now.bits & FLAG.FORFEITED and not before & FLAG.FORFEITED
-        if now.bits & FLAG.STOPPED and (not before & FLAG.STOPPED or renewed or forfeited):
+        if now.bits & FLAG.STOPPED and (not before & FLAG.STOPPED or renews_ticket(before, now.bits)):
             self._rows[index].ticket = tick
 
     def _waits(self, now: Propositions, vertex: int) -> bool:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 from dubins_traffic.cars.state import Pose, Propositions
-from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.rules.propositions import FLAG, renews_ticket
 from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Forfeits
 from dubins_traffic.synthesis.board import Board
@@ -401,9 +401,7 @@ class RoadPlay:
             self._ticket[car] = NO_TICKET
         elif self._ticket[car] == NO_TICKET:
             self._ticket[car] = tick
-        elif bits & FLAG.FORFEITED and (
-            not before & FLAG.FORFEITED or (before & FLAG.FIRST and not bits & FLAG.FIRST)
-        ):
+        elif renews_ticket(before, bits):
             self._ticket[car] = tick
             self.noted.append(
                 (NEW_TICKET, f"{self._names[car]} in {self._board.arena.name(self.cells[car])}")
