@@ -12,7 +12,6 @@ three bodies, at 10 and 30 Hz: 2,000 trials unless said otherwise. What came of 
 from __future__ import annotations
 
 import argparse
-import hashlib
 import json
 import time
 from collections.abc import Sequence
@@ -26,18 +25,12 @@ from tests.contract_blocking import BLOCKING
 from tests.contract_provoking import PROVOKING
 from tests.contract_scenes import SCENES, Came, trial
 
-import dubins_traffic
-from experiments.stored import store, write_page
+from experiments.stored import code, store, write_page
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 FOLDER: Final = ROOT / "build" / "conformance"
+SCENE_FILES: Final = tuple(sorted((ROOT / "tests").glob("contract_*.py")))
 TRIALS, SECONDS, JOBS = 2000, 300.0, 2
-
-
-def code() -> str:
-    """Return a digest of the package's sources and of the scenes."""
-    files = [*Path(dubins_traffic.__file__).parent.rglob("*.py"), *(ROOT / "tests").glob("contract_*.py")]
-    return hashlib.sha256(b"".join(path.read_bytes() for path in sorted(files))).hexdigest()[:16]
 
 
 def scene(place: int) -> tuple[str, int]:
@@ -58,7 +51,7 @@ def known(file: Path) -> dict[tuple[str, int], Came]:
 
 def came(trials: int = TRIALS, jobs: int = JOBS, seconds: float | None = None) -> list[Came]:
     """Run the trials that no file tells of, in `jobs` processes, for some seconds; return all that are known."""
-    file = FOLDER / f"{code()}.jsonl"
+    file = FOLDER / f"{code(*SCENE_FILES)}.jsonl"
     file.parent.mkdir(parents=True, exist_ok=True)
     places = [scene(place) for place in range(trials)]
     found = known(file)

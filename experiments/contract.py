@@ -14,7 +14,6 @@ counts so far are kept as the result of the experiment, whatever the number of t
 from __future__ import annotations
 
 import argparse
-import hashlib
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -23,15 +22,16 @@ from typing import Any, Final
 
 from benchmarks.table import Row, show
 
-import dubins_traffic
 from dubins_traffic.falsification.archive import Found
 from dubins_traffic.falsification.contract import BLOCKED, PROVOKED
 from dubins_traffic.falsification.search import falsify
 from dubins_traffic.problem.configuration import Configuration
-from experiments.stored import store, write_page
+from experiments.stored import code, store, write_page
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 FOLDER: Final = ROOT / "build" / "contract"
+RESTS_ON: Final = (ROOT / "experiments" / "free_egos.py", ROOT / "tests" / "mutated.py")
+"""The egos that are searched."""
 TRIALS: Final = 1_000_000
 DAY: Final = 86_400.0
 SEED: Final = 1
@@ -85,20 +85,9 @@ HAPPENS: Final = {
 }
 
 
-def code() -> str:
-    """Return a digest of the package's sources and of the egos that are searched."""
-    package = Path(dubins_traffic.__file__).parent
-    files = [
-        *sorted(package.rglob("*.py")),
-        ROOT / "experiments" / "free_egos.py",
-        ROOT / "tests" / "mutated.py",
-    ]
-    return hashlib.sha256(b"".join(path.read_bytes() for path in files)).hexdigest()[:16]
-
-
 def searched(name: str, trials: int = TRIALS, seconds: float = DAY, workers: int = 1) -> Found:
     """Search, or go on where an earlier search of the same sources ended, and return what has been found."""
-    own, folder = SEARCHES[name], FOLDER / code() / name
+    own, folder = SEARCHES[name], FOLDER / code(*RESTS_ON) / name
     began = time.monotonic()
     found = falsify(
         Configuration.from_document(own.world), own.controller, folder, rules=[own.target], trials=trials,

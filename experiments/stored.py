@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import subprocess
 from collections.abc import Mapping, Sequence
@@ -13,10 +14,19 @@ from typing import Any
 from benchmarks.table import Row, machine
 
 from dubins_traffic.files import write_text
+from dubins_traffic.release import sources_hash
 
 ROOT = Path(__file__).resolve().parents[1]
 FOLDER = ROOT / "experiments" / "results"
 PAGE = ROOT / "docs" / "experiments.md"
+
+
+def code(*files: Path) -> str:
+    """Return a digest of the package's sources and of other files on which an experiment rests, to name its folder."""
+    digest = hashlib.sha256(sources_hash().encode())
+    for path in files:
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:16]
 
 
 @dataclass(frozen=True, slots=True)
