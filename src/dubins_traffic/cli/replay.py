@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Final
 
 import typer
 
@@ -16,6 +16,9 @@ EXAMPLES = options.examples(
     "replay out/trial-0000.mcap -o trial.gif --speed 4 --to 60",
     "replay out/trial-0000.mcap --at 12.5",
 )
+
+OPTIONS: Final = {"fps": "--fps", "speed": "--speed", "start": "--from", "stop": "--to", "size": "--size"}
+"""Options of moving pictures, by the parameter of `animate`."""
 
 
 def replay(
@@ -80,33 +83,30 @@ def replay(
     from dubins_traffic.cli.tables import summary
     from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.score import score
-    from dubins_traffic.viewer.animate import (
-        CODECS,
-        FPS,
-        SIZE,
-        SUFFIXES,
-        VIDEO_FPS,
-        Animation,
-        require_moving,
-    )
+    from dubins_traffic.viewer.animate import CODECS, SUFFIXES, VIDEO_FPS, animate, require_moving
     from dubins_traffic.viewer.marks import formula_marks
     from dubins_traffic.viewer.pages import PAGES
     from dubins_traffic.viewer.replay import write_replay
 
     output = output or options.beside(record, ".html")
     suffix = Path(output).suffix.lower()
+    moves = suffix in SUFFIXES
     require_moving(output, overwrite=overwrite, apart_from=[record], others=PAGES)
-    if suffix not in SUFFIXES:
-        given = {"--fps": fps, "--speed": speed, "--from": start, "--to": stop, "--size": size}
-        for name, value in given.items():
-            if value is not None:
-                expected = "no such option for a page, which plays the whole trial at any speed"
-                raise InputError("of a moving picture", field=name, value=value, expected=expected)
-    elif at is not None:
+    given = {"fps": fps, "speed": speed, "start": start, "stop": stop, "size": size}
+    chosen: dict[str, Any] = {name: value for name, value in given.items() if value is not None}
+    if moves and at is not None:
         raise InputError("of a page", field="--at", value=at, expected="--from for a moving picture")
+    for name, value in () if moves else chosen.items():
+        expected = "no such option for a page, which plays the whole trial at any speed"
+        raise InputError("of a moving picture", field=OPTIONS[name], value=value, expected=expected)
     found = load_record(record)
     scored = score(found)
-    if suffix not in SUFFIXES:
+    if moves:
+        usual: dict[str, Any] = {"fps": VIDEO_FPS} if suffix in CODECS else {}
+        moving = animate(found, **(usual | chosen), verdict=scored.verdict)
+        with progress(len(moving), what="pictures") as tell:
+            moving.write(output, overwrite=overwrite, progress=tell)
+    else:
         write_replay(
             output,
             found.instance,
@@ -118,16 +118,4 @@ def replay(
             overwrite=overwrite,
             at=at,
         )
-    else:
-        moving = Animation(
-            found,
-            fps=(VIDEO_FPS if suffix in CODECS else FPS) if fps is None else fps,
-            speed=1.0 if speed is None else speed,
-            start=start,
-            stop=stop,
-            size=SIZE if size is None else size,
-            verdict=scored.verdict,
-        )
-        with progress(len(moving), what="pictures") as tell:
-            moving.write(output, overwrite=overwrite, progress=tell)
     options.tell(output)

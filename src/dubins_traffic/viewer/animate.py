@@ -102,12 +102,12 @@ class Animation:
         self,
         record: Record,
         *,
-        fps: float = FPS,
-        speed: float = 1.0,
-        start: float | None = None,
-        stop: float | None = None,
-        size: int = SIZE,
-        verdict: Verdict | None = None,
+        fps: float,
+        speed: float,
+        start: float | None,
+        stop: float | None,
+        size: int,
+        verdict: Verdict | None,
     ) -> None:
         frames = record.frames
         if len(frames) == 0:
