@@ -37,17 +37,24 @@ def lean(b: int, n: int, offset: float, way: ReferencePath, near: int, traffic: 
 
 @jit_rare
 def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
-    """Tell whether a car may turn aside where it is: near the crossing out of which it comes it may enter that anew."""
+    """Tell whether a car may turn aside where it is: in a bend, between two, and before a crossing if it is a disc.
+
+    Near the crossing out of which it comes it may enter that anew, and a rectangle that is tilted at a line may find no
+    room to turn.
+    """
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     vehicle, net = drivers.vehicle[b], drivers.net[b]
     first = int(roads.vert_off[net])
     disc, lane = int(labels.crosses[b, n]), int(labels.lane[b, n])
     if disc >= 0 and int(roads.degree[first + disc]) < vehicle.degree:
         return True
-    if lane < 0 or (disc >= 0 and disc != lane_end(roads, net, lane)):
+    if lane < 0:
         return False
-    begin = int(roads.degree[first + lane_start(roads, net, lane)])
-    return begin < vehicle.degree or not is_by_disc_behind(b, n, way, traffic)
+    v = lane_end(roads, net, lane)
+    begin, end = int(roads.degree[first + lane_start(roads, net, lane)]), int(roads.degree[first + v])
+    if disc < 0 and begin < vehicle.degree and end < vehicle.degree:
+        return True
+    return vehicle.half_length == 0.0 and disc in (-1, v) and not is_by_disc_behind(b, n, way, traffic)
 
 
 @jit_rare
