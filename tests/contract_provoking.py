@@ -105,13 +105,8 @@ def ego_tilted(number: int) -> Made:
 
 
 def ego_beside_line(number: int) -> Made:
-    """The ego stands in the other lane beside the line of a crossing, as far over the centre line as it may.
-
-    Cars are discs or at 30 Hz: at 10 Hz a rectangle finds no safe way past (docs/theory.md#on-the-road).
-    """
+    """The ego stands in the other lane beside the line of a crossing, as far over the centre line as it may."""
     stage = Stage(number, TEE)
-    if stage.rate < 30.0:
-        stage.body = Disc(0.177)
     lane = stage.lane_into(3)
     half = stage.body.radius if isinstance(stage.body, Disc) else 0.5 * stage.body.width
     far = RADIUS + stage.reach + stage.dice.uniform(-0.1, 0.3)

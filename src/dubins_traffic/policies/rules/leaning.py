@@ -6,6 +6,9 @@ the middle of its lane and one that stands at the centre line, yet the lane is f
 
 from __future__ import annotations
 
+import numpy as np
+
+from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
 from dubins_traffic.policies.rules.seeing import SIDE, is_by_disc_behind
@@ -13,6 +16,7 @@ from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath, on_way
 from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import lane_end, lane_start
+from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import half_across
 
 
@@ -37,10 +41,10 @@ def lean(b: int, n: int, offset: float, way: ReferencePath, near: int, traffic: 
 
 @jit_rare
 def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
-    """Tell whether a car may turn aside where it is: in a bend, between two, and before a crossing if it is a disc.
+    """Tell whether a car may turn aside where it is: in a bend, between two, and toward a crossing past a standing ego.
 
-    Near the crossing out of which it comes it may enter that anew, and a rectangle that is tilted at a line may find no
-    room to turn.
+    Near the crossing out of which it comes it may enter that anew. A rectangle that is tilted at a line may find no
+    room to turn, so it does not lean there away from other e-agents, which drive on.
     """
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     vehicle, net = drivers.vehicle[b], drivers.net[b]
@@ -54,7 +58,14 @@ def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
     begin, end = int(roads.degree[first + lane_start(roads, net, lane)]), int(roads.degree[first + v])
     if disc < 0 and begin < vehicle.degree and end < vehicle.degree:
         return True
-    return vehicle.half_length == 0.0 and disc in (-1, v) and not is_by_disc_behind(b, n, way, traffic)
+    return disc in (-1, v) and not is_by_disc_behind(b, n, way, traffic) and ego_stands_beside(b, n, traffic)
+
+
+@jit_rare
+def ego_stands_beside(b: int, n: int, traffic: Traffic) -> bool:
+    """Tell whether the ego stands on the road of car n, in the other lane state."""
+    labels, lane = traffic.labels, int(traffic.labels.lane[b, n])
+    return labels.lane[b, EGO] == lane ^ 1 and np.int64(labels.bits[b, EGO]) & FLAG.STANDS != 0
 
 
 @jit_rare
