@@ -89,7 +89,7 @@ def slowed_by(tight: float) -> float:
 
 @jit_inline
 def back_at(until: float, tight: float, vehicle: Vehicle) -> float:
-    """Return where a car that begins to return at `until` (m) is in its lane again, metres before the intersection.
+    """Return where a car that begins to return at `until` (m) is in its lane again, metres from its end, negative.
 
     `tight` (ratio) is `Scratch.tight`. On the straight end of a road it needs no more than on a straight road.
     """
