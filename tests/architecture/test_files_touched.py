@@ -21,7 +21,7 @@ TOUCHED = {
     "transport": (r"sessions\.stdio|run_over_stdio\b", {"sessions.registry", "sessions.stdio"}),
     "map format": (
         r"formats\.commonroad(\"| import)|class CommonRoad\b",
-        {"roads.formats.commonroad", "roads.formats.registry"},
+        {"maps.commonroad", "roads.formats.registry"},
     ),
 }
 """Of one of each: how files know it, and which do, two at most."""

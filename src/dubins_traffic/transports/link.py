@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Self
 
@@ -23,6 +24,7 @@ from dubins_traffic.protocols import (
     Clock,
     Closes,
     Controller,
+    Driver,
     End,
     Ending,
     Looks,
@@ -37,6 +39,7 @@ from dubins_traffic.transports.inbox import Inbox, Punctuality, Slot
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
+    from dubins_traffic.record.wall import Wall
 
 EGO_NAME = "ego"
 IDLE = 0.1
@@ -170,6 +173,29 @@ class Link:
     def close(self) -> None:
         """Close the transport."""
         self.transport.close()
+
+    @property
+    def name(self) -> str:
+        """Name of the transport."""
+        return self.transport.name
+
+    def controller(self) -> Controller:
+        """Return the ego's driver elsewhere."""
+        return RemoteController(self)
+
+    def beside(self, controller: Controller) -> Controller:
+        """Return a controller of this process whose start tells the peers that the trial begins."""
+        return LocalController(self, controller)
+
+    def agents(self) -> Driver:
+        """Return the driver of the e-agents that are driven elsewhere."""
+        return RemoteAgents(self)
+
+    def completed(self, measured: Wall) -> Wall:
+        """Return the wall-clock figures of the trial with those of the link."""
+        begin = self.time_to_begin if self.ego else measured.time_to_begin_s
+        reproducible = measured.reproducible and self.clock.lockstep
+        return replace(measured, time_to_begin_s=begin, reproducible=reproducible, transport=self.report())
 
     @property
     def running(self) -> bool:
