@@ -237,6 +237,12 @@ def _boxed(spec: str, limits: str) -> Any:
     return named(spec, limits)
 
 
+def _compiled(kernel: Any, kinds: Any) -> Any:
+    from dubins_traffic.compiling.beside import sought
+
+    return sought(kernel, kinds)
+
+
 def _why_no_boxes() -> str:
     from dubins_traffic.errors import InputError
     from dubins_traffic.sandbox.available import available_layers
@@ -260,7 +266,7 @@ def _part(place: str) -> Any:
     return getattr(found, name) if name else found
 
 
-ABOVE.html_of, ABOVE.rows_of = _html_of, _rows_of
+ABOVE.html_of, ABOVE.rows_of, ABOVE.compiled = _html_of, _rows_of, _compiled
 ABOVE.boxed, ABOVE.why_no_boxes, ABOVE.parts = _boxed, _why_no_boxes, _parts
 keep_earlier_names()
 

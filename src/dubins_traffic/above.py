@@ -28,6 +28,9 @@ class Above:
         Returns a value as rows of a table of trials, each a dict.
     boxed
         Returns the controller of a name, in a box with the limits of a text.
+    compiled
+        Returns the machine code of a kernel for arguments of some kinds where no library holds it, or what waits for
+        it while it is compiled (`kernels.compile.Waiting`); None if there will be none.
     why_no_boxes
         Returns why no stranger's controller can be boxed on this machine; empty if it can.
     parts
@@ -39,6 +42,7 @@ class Above:
         self.html_of: Callable[[Any], str] = _nobody
         self.rows_of: Callable[[Any], list[dict[str, Any]]] = _nobody
         self.boxed: Callable[[str, str], Any] = _nobody
+        self.compiled: Callable[[Any, Any], Any] = _nobody
         self.why_no_boxes: Callable[[], str] = _nobody
         self.parts: Callable[[str], Mapping[str, Callable[[], Any]]] = _nobody
 

@@ -9,10 +9,9 @@ from pathlib import Path
 import pytest
 
 from dubins_traffic.cli.main import main
-from dubins_traffic.compiling import building
+from dubins_traffic.compiling import beside, building, linking, store
 from dubins_traffic.compiling.building import build, entries
 from dubins_traffic.errors import InputError, MissingExtraError
-from dubins_traffic.kernels import beside, linking, store
 from dubins_traffic.kernels.compile import Entry
 from dubins_traffic.kernels.kinds import REAL
 from dubins_traffic.kernels.trig import sincos

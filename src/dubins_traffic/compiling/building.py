@@ -7,13 +7,14 @@ from pathlib import Path
 from time import sleep
 from typing import NamedTuple
 
+from dubins_traffic.compiling import beside, linking, store
+from dubins_traffic.compiling.loading import target
 from dubins_traffic.compiling.moments import moments
 from dubins_traffic.errors import InputError, MissingExtraError
-from dubins_traffic.kernels import beside, library, linking, store
+from dubins_traffic.kernels import library
 from dubins_traffic.kernels.compile import Entry, listed, never_compiled
 from dubins_traffic.kernels.folders import FOLDER, TIER, base_folder, own_folder
 from dubins_traffic.kernels.levels import level
-from dubins_traffic.kernels.machine import target
 
 PAUSE = 0.1
 """Seconds between two looks for what has been compiled."""
@@ -115,7 +116,7 @@ def _file_of(entry: Entry) -> Path:
     """Return the file of a kernel's machine code; a builder is told if it is not there yet."""
     path = store.kernel_file(entry.kernel.key(entry.kinds), target())
     if not path.exists():
-        _waiting.append(entry.kernel.waiting(entry.kinds, path, waits=True))
+        _waiting.append(beside.wanted(entry.kernel, entry.kinds, path, waits=True))
     return path
 
 

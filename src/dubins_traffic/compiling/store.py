@@ -17,11 +17,12 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from functools import cache
+from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from dubins_traffic.kernels.folders import KEPT, TIER, base_folder, own_folder
 from dubins_traffic.kernels.kinds import Kind
-from dubins_traffic.kernels.sources import PACKAGE, source_hash, versions_hash
+from dubins_traffic.kernels.sources import makers_hash
 
 SUFFIX = ".kernel"
 """Ending of the files of compiled kernels."""
@@ -29,7 +30,20 @@ SUFFIX = ".kernel"
 READABLE = 0o644
 """The mode of the files: a controller in a box (`dubins_traffic.sandbox`) is another user, and reads them."""
 
+LIBRARIES = ("numba", "llvmlite", "numpy")
+"""What compiles kernels."""
+
 _DIGEST = hashlib.sha256().digest_size
+
+
+@cache
+def versions_hash() -> str:
+    """Return a hash of the versions of what compiles kernels, and of how it is done here."""
+    digest = hashlib.sha256(sys.version.encode())
+    for name in LIBRARIES:
+        digest.update(_version(name).encode())
+    digest.update(makers_hash().encode())
+    return digest.hexdigest()[:16]
 
 
 @cache
@@ -52,34 +66,10 @@ def cache_folder() -> Path:
     return own_folder(Path(tempfile.gettempdir()) / f"dubins-traffic-{os.getuid()}" / versions_hash())
 
 
-def key_of(file: Path, name: str, kinds: Sequence[Kind]) -> str:
-    """Return what names a kernel, whatever it is compiled for: a folder of its source and a file.
-
-    Parameters
-    ----------
-    file : Path
-        The source that holds the kernel, of this package or another.
-    name : str
-        Name of the kernel in it.
-    kinds : sequence of Kind
-        Those of its arguments.
-    """
-    module = (
-        ".".join(file.relative_to(PACKAGE).with_suffix("").parts) if PACKAGE in file.parents else file.stem
-    )
-    digest = hashlib.sha256(repr(tuple(kinds)).encode()).hexdigest()[:24]
-    return f"{module}-{source_hash(file)}/{name}-{digest}"
-
-
 def kernel_file(key: str, processor: Sequence[str]) -> Path:
     """Return where the machine code of a kernel is kept for a processor, as `kernels.machine.processor` returns it."""
     digest = hashlib.sha256(repr(tuple(processor)).encode()).hexdigest()[:8]
     return cache_folder() / f"{key}-{digest}{SUFFIX}"
-
-
-def symbol(key: str) -> str:
-    """Return the name of the function in a kernel's machine code."""
-    return "kernel_" + hashlib.sha256(key.encode()).hexdigest()[:24]
 
 
 def load(path: Path) -> tuple[Kind, bytes] | None:
@@ -127,6 +117,13 @@ def write_whole(path: Path, data: bytes) -> None:
     except BaseException:
         Path(written).unlink(missing_ok=True)
         raise
+
+
+def _version(name: str) -> str:
+    try:
+        return version(name)
+    except PackageNotFoundError:
+        return ""
 
 
 @cache

@@ -8,8 +8,8 @@ entry can be called from outside. What only it calls is put into it, and the oth
 Nor is there code that unpacks Python's arguments one by one: an entry reads numbers and addresses from a frame
 (`kernels.kinds`).
 
-Numba's front end, typing and writing LLVM's language, takes most of the time: `kernels.frontend` has fewer steps,
-`kernels.frontend` finds things once, `kernels.lowering` writes less.
+Numba's front end, typing and writing LLVM's language, takes most of the time: `compiling.frontend` has fewer steps,
+`compiling.frontend` finds things once, `compiling.lowering` writes less.
 
 This rests on inner parts of Numba (`docs/design/030-speed.md`); it is the builder's process alone that they are
 changed in.
@@ -28,9 +28,9 @@ from numba.core import codegen, config, types  # pyright: ignore[reportMissingTy
 from numba.core.registry import cpu_target  # pyright: ignore[reportMissingTypeStubs]
 from numba.np import arrayobj, numpy_support  # pyright: ignore[reportMissingTypeStubs]
 
-from dubins_traffic.kernels.frontend import Pipeline, shorten
+from dubins_traffic.compiling.frontend import Pipeline, shorten
+from dubins_traffic.compiling.lowering import TablesType, index_plainly, learn_fetches, take_as_numbers
 from dubins_traffic.kernels.kinds import NONE, Kind, UnfitError, dtype_of, is_place
-from dubins_traffic.kernels.lowering import TablesType, index_plainly, learn_fetches, take_as_numbers
 
 RESHAPE = "numba_attempt_nocopy_reshape"
 """What Numba calls to reshape an array."""

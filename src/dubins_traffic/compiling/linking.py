@@ -15,9 +15,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from dubins_traffic.compiling import store
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels import store
-from dubins_traffic.kernels.sources import makers_hash
+from dubins_traffic.kernels.sources import makers_hash, symbol
 
 LINKERS = ("cc", "gcc", "clang")
 OPTIONS = ("-shared", "-nostdlib", "-Wl,-s", "-Wl,-z,noexecstack", "-Wl,-z,now")
@@ -48,7 +48,7 @@ def link(files: Mapping[str, Path], level: str, folder: Path) -> Path:
     Parameters
     ----------
     files : mapping
-        The files of compiled kernels (`kernels.store`), by their keys.
+        The files of compiled kernels (`compiling.store`), by their keys.
     level : str
         The level of processors that they are compiled for.
     folder : Path
@@ -74,10 +74,10 @@ def link(files: Mapping[str, Path], level: str, folder: Path) -> Path:
             held = store.load(path)
             if held is None:
                 raise FileNotFoundError(str(path))
-            symbol = store.symbol(key)
-            objects.append(f"{symbol}.o")
+            name = symbol(key)
+            objects.append(f"{name}.o")
             (Path(place) / objects[-1]).write_bytes(held[1])
-            kernels[symbol] = {"kernel": key, "answer": repr(held[0])}
+            kernels[name] = {"kernel": key, "answer": repr(held[0])}
         _run([*linker(), *OPTIONS, "-o", "library.so", *objects], place)
         digest = hashlib.sha256((Path(place) / "library.so").read_bytes()).hexdigest()
         library = folder / f"{level}-{digest[:12]}.so"

@@ -1,8 +1,9 @@
 """The builder: one process that compiles what it is told, one kernel after another.
 
-``python -m dubins_traffic.kernels.builder [--behind]``, which stands back behind all other processes; `kernels.beside`
-begins it and tells it by standard input what is wanted, a line for a kernel. It ends when it has compiled all that it
-was told and whoever began it has ended or has told nothing for a second, and after ten minutes in any case.
+``python -m dubins_traffic.compiling.builder [--behind]``, which stands back behind all other processes;
+`compiling.beside` begins it and tells it by standard input what is wanted, a line for a kernel. It ends when it has
+compiled all that it was told and whoever began it has ended or has told nothing for a second, and after ten minutes in
+any case.
 """
 
 from __future__ import annotations
@@ -19,10 +20,11 @@ from threading import Thread
 from time import monotonic, process_time, sleep
 from typing import TYPE_CHECKING
 
-from dubins_traffic.kernels import beside, store
+from dubins_traffic.compiling import beside, store
+from dubins_traffic.kernels.sources import key_of, symbol
 
 if TYPE_CHECKING:
-    from dubins_traffic.kernels.compiler import Compiler
+    from dubins_traffic.compiling.compiler import Compiler
 
 NICE = 19
 """How much the builder stands back behind others."""
@@ -109,8 +111,8 @@ def _make_room(hurry: Path) -> None:
 
 def _begin() -> Compiler:
     """Return the compiler, and let modules that are imported from now on make their kernels with it."""
+    from dubins_traffic.compiling.compiler import Compiler
     from dubins_traffic.kernels import compile as making
-    from dubins_traffic.kernels.compiler import Compiler
 
     compiler = Compiler()
     making.builder = compiler.jit
@@ -118,7 +120,7 @@ def _begin() -> Compiler:
 
 
 def _compile(compiler: Compiler, wish: beside.Wish) -> None:
-    from dubins_traffic.kernels.machine import target
+    from dubins_traffic.compiling.loading import target
 
     try:
         sys.path.extend(path for path in wish.paths if path not in sys.path)
@@ -126,10 +128,10 @@ def _compile(compiler: Compiler, wish: beside.Wish) -> None:
         found = importlib.import_module(wish.module)
         if not Path(found.__file__ or "").samefile(wish.file):
             raise ImportError(f"{wish.module} is {found.__file__} here")
-        key = store.key_of(Path(wish.file), wish.name, kinds)
+        key = key_of(Path(wish.file), wish.name, kinds)
         if store.kernel_file(key, target()) != wish.path:
             raise ImportError(f"{wish.file} is another than that which runs")
-        code, answer = compiler.machine_code(compiler.kernel(found, wish.name), kinds, store.symbol(key))
+        code, answer = compiler.machine_code(compiler.kernel(found, wish.name), kinds, symbol(key))
         store.save(wish.path, answer, code)
     except Exception:
         with contextlib.suppress(OSError):

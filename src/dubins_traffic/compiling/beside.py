@@ -1,8 +1,8 @@
 """Compiling beside: what has no machine code yet is told to one process, which compiles while this one goes on.
 
-The process is `kernels.builder`. Whoever begins it holds its lock and hands that over, so there is one for a folder of
-compiled kernels at a time, and it hears by a pipe what is wanted. Where another process has begun one, its
-machine code is waited for; what is still missing when it has ended is told to the next.
+The process is `compiling.builder`. Whoever begins it holds its lock and hands that over, so there is one for a folder
+of compiled kernels at a time, and it hears by a pipe what is wanted. Where another process has begun one, its machine
+code is waited for; what is still missing when it has ended is told to the next.
 """
 
 from __future__ import annotations
@@ -10,7 +10,6 @@ from __future__ import annotations
 import base64
 import contextlib
 import json
-import multiprocessing
 import os
 import subprocess
 import sys
@@ -23,8 +22,13 @@ from pathlib import Path
 from time import monotonic, sleep
 from typing import Any
 
-from dubins_traffic.kernels import levels, store
+from dubins_traffic.compiling import loading, store
+from dubins_traffic.kernels import levels
+from dubins_traffic.kernels.compile import PAUSE, Kernel, say, waits
+from dubins_traffic.kernels.folders import KEPT, TIER
 from dubins_traffic.kernels.kinds import Kind
+from dubins_traffic.kernels.machine import Code
+from dubins_traffic.kernels.sources import symbol
 
 LOCK = "builder.lock"
 """The file that a builder holds locked as long as it works; the system frees it however the builder ends."""
@@ -32,12 +36,18 @@ FAILED = ".failed"
 """Ending of the file that says why a kernel could not be compiled."""
 HURRY = "hurry"
 """The file that asks a builder that stands back, and gets little done, to end."""
-PAUSE = 0.25
-"""Seconds between two looks for a kernel that is wanted."""
 LONG = 10.0
 """Seconds of interpreted work after which what is wanted is worth a processor of its own."""
 STARTS = 3
 """So often is a kernel told to a builder, at most."""
+BESIDE = (
+    "kernels are being compiled in the background; until they are there, trials run interpreted, slower and with "
+    "the same results"
+)
+NO_COMPILER = (
+    "there is no machine code for some kernels, which run interpreted, slower and with the same results; "
+    "pip install 'dubins-traffic[compile]' compiles them"
+)
 
 
 @cache
@@ -162,6 +172,31 @@ class Waiting:
             self.failure = f"nothing can be kept: {error}"
 
 
+def sought(kernel: Kernel[..., Any], kinds: tuple[Kind, ...]) -> Code | Waiting | None:
+    """Return the machine code of a kernel that no library holds, or what waits for it; None if there will be none."""
+    kept_alone = os.environ.get(TIER) == KEPT
+    if not can_build():
+        if not kept_alone:
+            say(NO_COMPILER)
+        return None
+    key = kernel.key(kinds)
+    path = store.kernel_file(key, loading.processor())
+    found = store.load(path)
+    if found is not None:
+        return Code(kinds, found[0], loading.load(found[1], symbol(key)))
+    if kept_alone:
+        return None
+    waiting = kernel.patient or waits()
+    if not waiting:
+        say(BESIDE)
+    return wanted(kernel, kinds, path, waits=waiting)
+
+
+def wanted(kernel: Kernel[..., Any], kinds: Sequence[Kind], path: Path, *, waits: bool) -> Waiting:
+    """Tell a builder that the machine code of a kernel is wanted, in the file `path`."""
+    return Waiting(kernel.__module__, kernel.name, kernel.file, kinds, path, waits=waits)
+
+
 class Builder(subprocess.Popen[bytes]):
     """A process that compiles what this one tells it, and goes on with that when this one ends.
 
@@ -175,7 +210,12 @@ class Builder(subprocess.Popen[bytes]):
 
     def __init__(self, lock: int, *, behind: bool) -> None:
         quiet = subprocess.DEVNULL
-        command = [sys.executable, "-m", "dubins_traffic.kernels.builder", *(["--behind"] if behind else [])]
+        command = [
+            sys.executable,
+            "-m",
+            "dubins_traffic.compiling.builder",
+            *(["--behind"] if behind else []),
+        ]
         here = str(Path(__file__).resolve().parents[2])
         paths = [here, *filter(None, [os.environ.get("PYTHONPATH")])]
         around = {**os.environ, "PYTHONPATH": os.pathsep.join(paths)}
@@ -242,10 +282,3 @@ def end() -> None:
     if _begun and _begun[-1].process == os.getpid():
         _begun[-1].kill()
         _begun[-1].wait()
-
-
-@cache
-def say(text: str) -> None:
-    """Say something once on standard error, in the first process of a program alone."""
-    if multiprocessing.parent_process() is None:
-        print(f"dubins-traffic: {text}", file=sys.stderr, flush=True)

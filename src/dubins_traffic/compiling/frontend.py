@@ -250,7 +250,7 @@ def _prune(state: Any) -> None:
 
 
 def _rewrite(state: Any) -> None:
-    """Put in what is known before types are: codes (`kernels.lowering`), constant indices."""
+    """Put in what is known before types are: codes (`compiling.lowering`), constant indices."""
     blocks = state.func_ir.blocks
     for kind in _rewrites.rewrite_registry.rewrites["before-inference"]:
         rewrite = kind(state)
