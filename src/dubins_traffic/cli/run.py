@@ -104,31 +104,31 @@ def run(
     """Run a controller through trials and score it. Ctrl-C keeps all finished trials."""
     from dubins_traffic.runs.plan import plan
 
-    todo = plan(
-        source,
-        controller,
-        trials=trials,
-        repeat=repeat,
-        seed=seed,
-        rnd=rnd,
-        data=options.trial_data(data, data_over),
-        overwrite_data=data is None,
-        records=records,
-        overwrite=overwrite,
-        append=append,
-        deadline=deadline,
-        simulator=simulator,
-        show=gui,
-        shield=shield,
-        sandbox=options.boxes(sandbox, limits, trust),
-        metrics=metric or (),
-    )
     _check_watch(watch=watch, jobs=jobs, pace=pace, port=port, no_browser=no_browser)
-    if todo.configuration is not None:
-        maps.report(todo.configuration.network)
-    if todo.before:
-        faults.tell(f"{todo.before} trials have their records in {records}; {len(todo.jobs)} are left")
     with _stage(pace, port, opens=not no_browser) if watch else nullcontext() as stage:
+        todo = plan(
+            source,
+            controller,
+            trials=trials,
+            repeat=repeat,
+            seed=seed,
+            rnd=rnd,
+            data=options.trial_data(data, data_over),
+            overwrite_data=data is None,
+            records=records,
+            overwrite=overwrite,
+            append=append,
+            deadline=deadline,
+            simulator=simulator,
+            show=gui,
+            shield=shield,
+            sandbox=options.boxes(sandbox, limits, trust),
+            metrics=metric or (),
+        )
+        if todo.configuration is not None:
+            maps.report(todo.configuration.network)
+        if todo.before:
+            faults.tell(f"{todo.before} trials have their records in {records}; {len(todo.jobs)} are left")
         results, lost = _run(todo, jobs, records, stage, json=json)
     is_sound = faults.tell_failed([(own.instance, own.ending) for own in results])
     if lost is not None:

@@ -131,6 +131,10 @@ class Server:
 
     def _answer(self, _connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request with the page; None lets it open the socket."""
+        if (
+            getattr(request, "method", "GET") != "GET"
+        ):  # earlier versions of websockets let nothing else through
+            return _response(405, "the page is there to be read", "text/plain", {"Allow": "GET"})
         try:
             door = self._access.admit(request.path, _Read(request.headers))
         except RefusedError as error:
