@@ -22,24 +22,16 @@ Progress = Callable[[int, int], object]
 
 
 class Built(NamedTuple):
-    """What has been built.
-
-    Attributes
-    ----------
-    library : Path or None
-        The library; None if each kernel is in a file of its own, which llvmlite loads.
-    reason : str
-        Why there is no library.
-    kernels : int
-        Number of kernels.
-    failed : list of str
-        What could not be compiled, and why.
-    """
+    """What has been built."""
 
     library: Path | None
+    """The library; None if each kernel is in a file of its own, which llvmlite loads."""
     reason: str
+    """Why there is no library."""
     kernels: int
+    """Number of kernels."""
     failed: list[str]
+    """What could not be compiled, and why."""
 
 
 def build(folder: Path | None = None, progress: Progress | None = None) -> Built:

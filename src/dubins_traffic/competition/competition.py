@@ -192,26 +192,18 @@ class Phase:
 
     Trial number n is trial ``n % trials`` of configuration ``n // trials``, drawn from a seed of its own where
     the seeds are secret, else from the one seed of the phase.
-
-    Attributes
-    ----------
-    name : str
-        Such as ``test``.
-    model : PhaseModel
-        What the file says of it.
-    configurations : tuple of Named
-        Those of its trials.
-    ranking : Ranking
-        What ranks its entries.
-    folder : Path or None
-        Where sealed and revealed seeds lie; None for a competition that is no file.
     """
 
     name: str
+    """Such as ``test``."""
     model: PhaseModel
+    """What the file says of it."""
     configurations: tuple[Named, ...]
+    """Those of its trials."""
     ranking: Ranking
+    """What ranks its entries."""
     folder: Path | None = None
+    """Where sealed and revealed seeds lie; None for a competition that is no file."""
 
     @property
     def opens(self) -> datetime | None:
@@ -316,27 +308,18 @@ class Phase:
 
 @dataclass(frozen=True, slots=True)
 class Competition:
-    """A checked competition.
-
-    Attributes
-    ----------
-    document : Mapping
-        What the file says, with the configurations and their road networks written in; JSON.
-    model : CompetitionModel
-        The same, checked, with defaults.
-    configurations : tuple of Named
-        All of them.
-    file : str or None
-        Where it was read; named in messages.
-    folder : Path or None
-        Where sealed and revealed seeds lie: the folder of the file.
-    """
+    """A checked competition."""
 
     document: Mapping[str, Any]
+    """What the file says, with the configurations and their road networks written in; JSON."""
     model: CompetitionModel
+    """The same, checked, with defaults."""
     configurations: tuple[Named, ...]
+    """All of them."""
     file: str | None = field(default=None, compare=False)
+    """Where it was read; named in messages."""
     folder: Path | None = field(default=None, compare=False)
+    """Where sealed and revealed seeds lie: the folder of the file."""
 
     @staticmethod
     def from_document(

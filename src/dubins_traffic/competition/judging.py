@@ -58,36 +58,24 @@ _NUMBERS: Final = ("counted_rounds", SECOND, "icra2016", "collisions", "clean")
 
 
 class Judged(Strict):
-    """What came of one trial of a submission, as a value and as a JSON object.
-
-    Attributes
-    ----------
-    number : int
-        Of the trial in its phase.
-    row : dict
-        The score by columns (`scoring.columns.SCORES`), with ``number``, ``end`` and ``reason``: what ranking reads.
-    end : str
-        Why the trial ended: a named end, or ``failed`` if it could not be run.
-    owner : str or None
-        Whose fault the end was: ``submission``, ``platform``, or nobody's.
-    log : str
-        The tail of what the submission has printed.
-    frames : str or None
-        SHA-256 of all frames (`FramesHash`); None if it could not be run.
-    ran : str or None
-        Where the submission ran (`controllers.registry.ran`): boxed, or trusted with the limits that the machine has.
-    recorded : bytes or None
-        The record, if it was to be remembered; it is no part of the JSON object.
-    """
+    """What came of one trial of a submission, as a value and as a JSON object."""
 
     number: int
+    """Of the trial in its phase."""
     row: dict[str, Any]
+    """The score by columns (`scoring.columns.SCORES`), with ``number``, ``end`` and ``reason``: what ranking reads."""
     end: str
+    """Why the trial ended: a named end, or ``failed`` if it could not be run."""
     owner: Owner | None
+    """Whose fault the end was: ``submission``, ``platform``, or nobody's."""
     log: str
+    """The tail of what the submission has printed."""
     frames: str | None
+    """SHA-256 of all frames (`FramesHash`); None if it could not be run."""
     ran: str | None = None
+    """Where the submission ran (`controllers.registry.ran`): boxed, or trusted with the limits that the machine has."""
     recorded: bytes | None = Field(default=None, exclude=True, repr=False)
+    """The record, if it was to be remembered; it is no part of the JSON object."""
 
     @property
     def counts(self) -> bool:

@@ -29,40 +29,31 @@ PLATFORM: Final = frozenset(end for end, owner in OWNERS.items() if owner == "pl
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """The place of one entry.
-
-    Attributes
-    ----------
-    place : int
-        From 1; entries that nothing parts share one, and the next is as much lower.
-    entry : str
-        Whose it is.
-    trials : int
-        How many trials it rests on.
-    estimate : Estimate
-        Mean of the metric over the trials, with its 95 % interval.
-    second : float
-        Mean of the rounds before the first breach, which parts entries of equal means.
-    satisfied, clean : Share
-        Of the trials, with Wilson's intervals: satisfied to the end; nothing broken, of those that were not cut.
-    cut : int
-        Trials that others ended before the ego broke anything (docs/rules.md#cut); they count as all do in `estimate`.
-    ties : tuple of str
-        The other entries from which it can't be told: the interval of the paired differences holds 0.
-    to_next : Estimate or None
-        By how much it exceeds the next lower place, trial by trial; None for the lowest.
-    """
+    """The place of one entry."""
 
     place: int
+    """From 1; entries that nothing parts share one, and the next is as much lower."""
     entry: str
+    """Whose it is."""
     trials: int
+    """How many trials it rests on."""
     estimate: Estimate
+    """Mean of the metric over the trials, with its 95 % interval."""
     second: float
+    """Mean of the rounds before the first breach, which parts entries of equal means."""
     satisfied: Share
     clean: Share
+    """`satisfied`, `clean`: of the trials, with Wilson's intervals: satisfied to the end; nothing broken, of those
+    that were not cut.
+    """
     cut: int
+    """Trials that others ended before the ego broke anything (docs/rules.md#cut); they count as all do in
+    `estimate`.
+    """
     ties: tuple[str, ...]
+    """The other entries from which it can't be told: the interval of the paired differences holds 0."""
     to_next: Estimate | None
+    """By how much it exceeds the next lower place, trial by trial; None for the lowest."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the place as a JSON object."""

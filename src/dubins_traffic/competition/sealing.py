@@ -82,24 +82,16 @@ class Seeded(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Seeds:
-    """The seeds of a phase with what hides them until they are revealed.
-
-    Attributes
-    ----------
-    phase : str
-        Its name.
-    rules : str
-        `Phase.rules` when the seeds were drawn.
-    salt : str
-        32 random bytes as hexadecimal digits: nobody can try seeds against the commitment.
-    seeds : tuple of int
-        One a trial, in the order of their numbers.
-    """
+    """The seeds of a phase with what hides them until they are revealed."""
 
     phase: str
+    """Its name."""
     rules: str
+    """`Phase.rules` when the seeds were drawn."""
     salt: str
+    """32 random bytes as hexadecimal digits: nobody can try seeds against the commitment."""
     seeds: tuple[int, ...]
+    """One a trial, in the order of their numbers."""
 
     @property
     def text(self) -> str:

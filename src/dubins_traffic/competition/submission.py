@@ -262,22 +262,16 @@ class Manifest(Strict):
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """A checked and stored submission.
-
-    Attributes
-    ----------
-    digest : str
-        SHA-256 over a line ``SHA-256  name`` for each file, sorted by name. Dates and permissions do not count.
-    kind : str
-        ``python``: a class that our shim drives; ``program``: anything else, which speaks lines; ``image``: a container
-        image with such a program.
-    path : Path
-        The folder in which it is stored.
-    """
+    """A checked and stored submission."""
 
     digest: str
+    """SHA-256 over a line ``SHA-256 name`` for each file, sorted by name. Dates and permissions do not count."""
     kind: Kind
+    """``python``: a class that our shim drives; ``program``: anything else, which speaks lines; ``image``: a
+    container image with such a program.
+    """
     path: Path
+    """The folder in which it is stored."""
 
 
 def check_submission(

@@ -36,27 +36,18 @@ _BEFORE_TRIALS = ("rejected", "cancelled")
 
 @dataclass(frozen=True, slots=True)
 class SubmissionState:
-    """Where a submission is.
-
-    Attributes
-    ----------
-    state : str
-        One of `State`.
-    reason : str
-        Why it is there, for people.
-    owner : str or None
-        Whose fault that is: ``submission``, ``platform``, or nobody's.
-    received : str or None
-        When it was received, UTC, ISO 8601.
-    place : int or None
-        Its place in the queue, from 1.
-    """
+    """Where a submission is."""
 
     state: State
+    """One of `State`."""
     reason: str = ""
+    """Why it is there, for people."""
     owner: Literal["submission", "platform"] | None = None
+    """Whose fault that is: ``submission``, ``platform``, or nobody's."""
     received: str | None = None
+    """When it was received, UTC, ISO 8601."""
     place: int | None = None
+    """Its place in the queue, from 1."""
 
 
 def visible(

@@ -100,24 +100,16 @@ Bools = npt.NDArray[np.bool_]
 
 @dataclass
 class Cast:
-    """Which cars learners drive in the trials of a crew.
-
-    Parameters
-    ----------
-    learned : sequence of int
-        Numbers of the cars that learners drive.
-    ego : str or None
-        The controller that drives the ego, by its name; None if a learner does.
-    shields : dict
-        Of cars under a shield, by number, when they may cross the centre line.
-    excuses : bool
-        Whether what one side breaks after the other costs nothing (`Blame`).
-    """
+    """Which cars learners drive in the trials of a crew."""
 
     learned: Sequence[int]
+    """Numbers of the cars that learners drive."""
     ego: str | None = None
+    """The controller that drives the ego, by its name; None if a learner does."""
     shields: dict[int, Overtakes] = field(default_factory=dict[int, "Overtakes"])
+    """Of cars under a shield, by number, when they may cross the centre line."""
     excuses: bool = True
+    """Whether what one side breaks after the other costs nothing (`Blame`)."""
 
 
 class Crew:

@@ -31,21 +31,14 @@ LEVEL_DRAW: Final = 260
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """A pool of road networks that are drawn once.
-
-    Parameters
-    ----------
-    count : int
-        How many there are.
-    seed : int
-        What they are drawn from.
-    split : str
-        ``train``, or ``test`` for as many others, none of which is drawn for training.
-    """
+    """A pool of road networks that are drawn once."""
 
     count: int
+    """How many there are."""
     seed: int = 0
+    """What they are drawn from."""
     split: str = "train"
+    """``train``, or ``test`` for as many others, none of which is drawn for training."""
 
     def __post_init__(self) -> None:
         if isinstance(self.count, bool) or not 1 <= self.count < TEST:

@@ -108,37 +108,26 @@ OBSERVATIONS: Final = ("flat", "dict", "object")
 
 @dataclass(frozen=True)
 class Settings:
-    """The checked settings that environments of one kind share.
-
-    Parameters
-    ----------
-    config : Configuration, path, name or mapping
-        What the trials are drawn from.
-    observation : str
-        ``flat``, ``dict`` (the parts of the flat vector by name) or ``object`` (`cars.state.Observation`).
-    action : str
-        ``continuous`` or ``discrete``.
-    frame_skip : int
-        Ticks of a step, for which its command is held.
-    reward : mapping, optional
-        Weights of terms by name, where they are not those of `envs.terms.WEIGHTS`.
-    cars : int
-        Other cars that a flat observation shows, at most.
-    levels : int, mapping or Levels, optional
-        A pool of road networks that are drawn once.
-    formulas : mapping, optional
-        Formulas (docs/verdicts.md), texts by name, whose states are told in ``info["formulas"]``: what is said of each
-        so far, judged after every tick. The trials know nothing of them.
-    """
+    """The checked settings that environments of one kind share."""
 
     config: Configuration | str | os.PathLike[str] | Mapping[str, Any]
+    """What the trials are drawn from."""
     observation: str = "flat"
+    """``flat``, ``dict`` (the parts of the flat vector by name) or ``object`` (`cars.state.Observation`)."""
     action: str = "continuous"
+    """``continuous`` or ``discrete``."""
     frame_skip: int = 1
+    """Ticks of a step, for which its command is held."""
     reward: Mapping[str, float] | None = None
+    """Weights of terms by name, where they are not those of `envs.terms.WEIGHTS`."""
     cars: int = SHOWN
+    """Other cars that a flat observation shows, at most."""
     levels: Levels | Mapping[str, Any] | int | None = None
+    """A pool of road networks that are drawn once."""
     formulas: Mapping[str, str] | None = None
+    """Formulas (docs/verdicts.md), texts by name, whose states are told in ``info["formulas"]``: what is said of
+    each so far, judged after every tick. The trials know nothing of them.
+    """
     episodes: Episodes = field(init=False)
     actions: ActionMap = field(init=False)
     weights: Floats = field(init=False)

@@ -300,31 +300,23 @@ def _roads(degree: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a search leaves.
-
-    Attributes
-    ----------
-    folder : Path
-        Its folder.
-    cases : dict of str to Case
-        One case for each kind of failure, by the name of its cell.
-    trials, discarded, faulty, violated : int
-        How many trials it has run; of these, in how many the assumption was broken first, how many ended by a fault,
-        and in how many the ego broke a rule that was asked for.
-    coverage : list of Row
-        Which rule, manoeuvre and crossing were put to the test.
-    fault : str
-        How many trials ended by which fault, and why the first; empty if none did.
-    """
+    """What a search leaves."""
 
     folder: Path
+    """Its folder."""
     cases: Mapping[str, Case]
+    """One case for each kind of failure, by the name of its cell."""
     trials: int
     discarded: int
     faulty: int
     violated: int
+    """`trials`, `discarded`, `faulty`, `violated`: how many trials it has run; of these, in how many the assumption
+    was broken first, how many ended by a fault, and in how many the ego broke a rule that was asked for.
+    """
     coverage: list[Row]
+    """Which rule, manoeuvre and crossing were put to the test."""
     fault: str = ""
+    """How many trials ended by which fault, and why the first; empty if none did."""
 
     @property
     def page(self) -> Path:

@@ -45,19 +45,14 @@ CAPRICIOUS: Final = ("rolls", "left", "blocks", "tailgates", "parks")
 
 @dataclass(frozen=True, slots=True)
 class Kept:
-    """What came of the contract in a trial.
-
-    Attributes
-    ----------
-    margins : dict of str to float
-        Of `BLOCKED` by how many seconds the longest wait stayed below its limit, where the trial is longer than that;
-        of `PROVOKED` 1 where no such car broke anything. Negative where it was not kept.
-    frames : dict of str to int
-        The frames in which it was broken.
-    """
+    """What came of the contract in a trial."""
 
     margins: dict[str, float] = field(default_factory=dict[str, float])
+    """Of `BLOCKED` by how many seconds the longest wait stayed below its limit, where the trial is longer than that;
+    of `PROVOKED` 1 where no such car broke anything. Negative where it was not kept.
+    """
     frames: dict[str, int] = field(default_factory=dict[str, int])
+    """The frames in which it was broken."""
 
 
 def limit_of(problem: Problem) -> float | None:

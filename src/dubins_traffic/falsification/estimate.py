@@ -40,36 +40,26 @@ MOST_REPEATED: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Replicas:
-    """What runs say together.
-
-    Attributes
-    ----------
-    probability : float
-        The mean of their estimates.
-    interval : (float, float)
-        Its 95 % interval: Korn and Graubard's, from the spread of the estimates. If nothing was branched off, or no run
-        got to the event, it is Clopper and Pearson's of the first trials of all runs, which are those of Monte Carlo.
-        If most runs did not get there, it reaches around both, since the spread of few says little.
-    trials, extinct : int
-        How many trials ran; how many runs ended without the event.
-    repeated : float
-        The share of the branches that came to the same margin as their parents: nothing was left to chance for them.
-    worth : float or None
-        How many trials of Monte Carlo would have varied as much, p (1 - p) / variance; None if no run got there.
-    better : str
-        The method with the smaller variance from as many trials.
-    advice : tuple of str
-        What a user should know of the runs, in sentences.
-    """
+    """What runs say together."""
 
     probability: float
+    """The mean of their estimates."""
     interval: Interval
+    """Its 95 % interval: Korn and Graubard's, from the spread of the estimates. If nothing was branched off, or no
+    run got to the event, it is Clopper and Pearson's of the first trials of all runs, which are those of Monte
+    Carlo. If most runs did not get there, it reaches around both, since the spread of few says little.
+    """
     trials: int
     extinct: int
+    """`trials`, `extinct`: how many trials ran; how many runs ended without the event."""
     repeated: float
+    """The share of the branches that came to the same margin as their parents: nothing was left to chance for them."""
     worth: float | None
+    """How many trials of Monte Carlo would have varied as much, p (1 - p) / variance; None if no run got there."""
     better: str
+    """The method with the smaller variance from as many trials."""
     advice: tuple[str, ...] = ()
+    """What a user should know of the runs, in sentences."""
 
     def to_json(self) -> dict[str, Any]:
         """Return what a JSON object of the estimate says beyond it."""
@@ -144,46 +134,34 @@ Progress = Callable[[int], object]
 
 @dataclass(frozen=True, slots=True)
 class Probability:
-    """The probability of an event.
-
-    Attributes
-    ----------
-    method : str
-        ``monte-carlo`` or ``splitting``.
-    event : str
-        What happens, in words.
-    probability : float
-        The estimate.
-    interval : (float, float)
-        Its 95 % interval: Clopper and Pearson's, or that of independent runs (`Replicas`).
-    wilson : (float, float) or None
-        Wilson's interval, of Monte Carlo.
-    trials, events, discarded : int
-        How many trials ran; of Monte Carlo, in how many the event happened, and how many were left out since the
-        e-agents broke the assumption before the ego broke anything.
-    runs : tuple of float
-        The estimates of the independent runs of splitting.
-    left_out : int
-        Trials that ended by a fault before the event: they are no evidence, and all of Monte Carlo's figures are those
-        of the others. If these are none, the probability is not a number.
-    fault : str
-        How many trials ended by which fault, and why the first; empty if none did.
-    replicas : Replicas or None
-        What these runs say together, and whether Monte Carlo is better.
-    """
+    """The probability of an event."""
 
     method: str
+    """``monte-carlo`` or ``splitting``."""
     event: str
+    """What happens, in words."""
     probability: float
+    """The estimate."""
     interval: Interval
+    """Its 95 % interval: Clopper and Pearson's, or that of independent runs (`Replicas`)."""
     wilson: Interval | None
+    """Wilson's interval, of Monte Carlo."""
     trials: int
     events: int | None
     discarded: int | None
+    """`trials`, `events`, `discarded`: how many trials ran; of Monte Carlo, in how many the event happened, and how
+    many were left out since the e-agents broke the assumption before the ego broke anything.
+    """
     runs: tuple[float, ...] = ()
+    """The estimates of the independent runs of splitting."""
     left_out: int = 0
+    """Trials that ended by a fault before the event: they are no evidence, and all of Monte Carlo's figures are
+    those of the others. If these are none, the probability is not a number.
+    """
     fault: str = ""
+    """How many trials ended by which fault, and why the first; empty if none did."""
     replicas: Replicas | None = None
+    """What these runs say together, and whether Monte Carlo is better."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the estimate as a JSON object."""

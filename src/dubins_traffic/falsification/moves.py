@@ -24,27 +24,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Genome:
-    """What an instance of a search is made of.
-
-    Attributes
-    ----------
-    base : int
-        Number of the trial of the configuration whose network, goals and cars it has.
-    root : int
-        Number of the trial of the search that was drawn and from which this one descends.
-    starts : mapping of int to Pose
-        Other starts of some of its cars, by the cars' numbers.
-    tables : mapping of int to (K, 7) float64
-        What each e-agent chooses (`agents.choices`), by the cars' numbers.
-    whims : mapping of int to (K, 5) float64
-        What each free e-agent likes to do (`agents.whims`), by the cars' numbers.
-    """
+    """What an instance of a search is made of."""
 
     base: int
+    """Number of the trial of the configuration whose network, goals and cars it has."""
     root: int
+    """Number of the trial of the search that was drawn and from which this one descends."""
     starts: Mapping[int, Pose] = field(default_factory=dict[int, Pose])
+    """Other starts of some of its cars, by the cars' numbers."""
     tables: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
+    """Shape (K, 7) each. What each e-agent chooses (`agents.choices`), by the cars' numbers."""
     whims: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
+    """Shape (K, 5) each. What each free e-agent likes to do (`agents.whims`), by the cars' numbers."""
 
     @property
     def choosing(self) -> list[int]:

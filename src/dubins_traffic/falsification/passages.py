@@ -37,35 +37,26 @@ Bools = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Passages:
-    """The stretches of some trials, one row each, in order of trial and time.
-
-    Attributes
-    ----------
-    trial : (P,) int64
-        Which of the trials.
-    first, end : (P,) int64
-        Its first frame, and the frame after its last.
-    manoeuvre, degree : (P,) int64
-        What the ego did, and how many roads meet in the disc, or in the one at the end of the road.
-    in_disc : (P,) bool
-        Whether it leads through a disc.
-    disc : (P,) int64
-        The intersection whose disc that is; -1 on roads, and for who has never left the disc.
-    flags : (P,) int64
-        The flags of `rules.propositions` that held of the ego in a frame of the stretch, and `BARRED`.
-    before : (P,) int64
-        The flags of the stretch before, 0 for the first one of a trial.
-    """
+    """The stretches of some trials, one row each, in order of trial and time."""
 
     trial: Ints
+    """Shape (P,). Which of the trials."""
     first: Ints
     end: Ints
+    """`first`, `end`: shape (P,). Its first frame, and the frame after its last."""
     manoeuvre: Ints
     degree: Ints
+    """`manoeuvre`, `degree`: shape (P,). What the ego did, and how many roads meet in the disc, or in the one at the
+    end of the road.
+    """
     in_disc: Bools
+    """Shape (P,). Whether it leads through a disc."""
     disc: Ints
+    """Shape (P,). The intersection whose disc that is; -1 on roads, and for who has never left the disc."""
     flags: Ints
+    """Shape (P,). The flags of `rules.propositions` that held of the ego in a frame of the stretch, and `BARRED`."""
     before: Ints
+    """Shape (P,). The flags of the stretch before, 0 for the first one of a trial."""
 
     def cell(self, rule: str, trial: int, tick: int) -> Cell:
         """Return the cell of a breach of `rule` at a frame of a trial.

@@ -24,31 +24,22 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What a controller did in a case.
-
-    Attributes
-    ----------
-    file : Path
-        The case.
-    case : Case
-        What it was.
-    verdict : str
-        The ruling, or how the trial ended if by a fault.
-    broken : tuple of str
-        The rules that the ego broke before the assumption fell, in order of time, and the formula or goal that the case
-        is about.
-    sentence : str
-        Who did what when; empty if the ego broke nothing.
-    fault : str
-        The end of a trial that ended by a fault and the reason, ``END: REASON``.
-    """
+    """What a controller did in a case."""
 
     file: Path
+    """The case."""
     case: Case
+    """What it was."""
     verdict: str
+    """The ruling, or how the trial ended if by a fault."""
     broken: tuple[str, ...]
+    """The rules that the ego broke before the assumption fell, in order of time, and the formula or goal that the
+    case is about.
+    """
     sentence: str
+    """Who did what when; empty if the ego broke nothing."""
     fault: str = ""
+    """The end of a trial that ended by a fault and the reason, ``END: REASON``."""
 
     @property
     def passed(self) -> bool:

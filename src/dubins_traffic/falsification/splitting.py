@@ -107,29 +107,21 @@ class Paths(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """What one run of the algorithm gives.
-
-    Attributes
-    ----------
-    probability : float
-        The estimate.
-    trials : int
-        How many trials it took.
-    counted : int
-        In how many of the first particles, which are independent trials, the event happened.
-    branches, repeated : int
-        How many particles were branched off; how many of them came to the margin of their parents, to the bit: nothing
-        was left to chance where they branched off.
-    levels : tuple of float
-        The scores at which particles were given up.
-    """
+    """What one run of the algorithm gives."""
 
     probability: float
+    """The estimate."""
     trials: int
+    """How many trials it took."""
     counted: int
+    """In how many of the first particles, which are independent trials, the event happened."""
     branches: int
     repeated: int
+    """`branches`, `repeated`: how many particles were branched off; how many of them came to the margin of their
+    parents, to the bit: nothing was left to chance where they branched off.
+    """
     levels: tuple[float, ...]
+    """The scores at which particles were given up."""
 
 
 class Run:

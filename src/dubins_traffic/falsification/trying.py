@@ -49,38 +49,32 @@ MOST: Final = 256
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """What a search keeps of a trial.
-
-    Attributes
-    ----------
-    discarded : bool
-        Whether the e-agents broke the assumption before the ego broke anything: then the trial says nothing of the ego.
-    faulty : bool
-        Whether it ended by a fault.
-    margins : dict
-        How far the ego stayed from breaking each rule, by the rules' names, and of each formula of the problem's own
-        ("formula NAME"), and in seconds the longest gap of a goal from its limit (`LIVENESS`); what nothing could break
-        is left out; and those of the contract (`contract.Kept`). Negative: broken. `DONE`: what the ego got done,
-        rounds, then the share of the goals visited, then metres.
-    cells : tuple of (Cell, int)
-        The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame;
-        and the frames in which the contract was broken, of discarded trials too.
-    situations : tuple of int
-        What it met with (`passages.Passages.situations`); empty where nobody asks for it.
-    fault : str
-        The end of a faulty trial and the reason, ``END: REASON``.
-    exercised : tuple of int
-        The numbers of the cells that it put to the test, each as often as it did; none if it ended by a fault, or
-        where nobody asks for it.
-    """
+    """What a search keeps of a trial."""
 
     discarded: bool
+    """Whether the e-agents broke the assumption before the ego broke anything: then the trial says nothing of the
+    ego.
+    """
     faulty: bool
+    """Whether it ended by a fault."""
     margins: dict[str, float]
+    """How far the ego stayed from breaking each rule, by the rules' names, and of each formula of the problem's own
+    ("formula NAME"), and in seconds the longest gap of a goal from its limit (`LIVENESS`); what nothing could break
+    is left out; and those of the contract (`contract.Kept`). Negative: broken. `DONE`: what the ego got done,
+    rounds, then the share of the goals visited, then metres.
+    """
     cells: tuple[tuple[Cell, int], ...]
+    """The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame; and
+    the frames in which the contract was broken, of discarded trials too.
+    """
     situations: tuple[int, ...] = ()
+    """What it met with (`passages.Passages.situations`); empty where nobody asks for it."""
     fault: str = ""
+    """The end of a faulty trial and the reason, ``END: REASON``."""
     exercised: tuple[int, ...] = ()
+    """The numbers of the cells that it put to the test, each as often as it did; none if it ended by a fault, or
+    where nobody asks for it.
+    """
 
     def to_json(self) -> dict[str, Any]:
         """Return it as a JSON object, from which `from_json` makes an equal one."""
@@ -302,18 +296,12 @@ MOST_IN_CHUNK: Final = 32
 
 
 class Crew(Protocol):
-    """Runs the trials of a search.
-
-    Attributes
-    ----------
-    make : callable or Remote
-        Makes the controller, or drives trials elsewhere.
-    name : str
-        What records and cases call it.
-    """
+    """Runs the trials of a search."""
 
     make: Maker | Remote
+    """Makes the controller, or drives trials elsewhere."""
     name: str
+    """What records and cases call it."""
 
     def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
         """Run the trials of instances; yield what came of some, by their places in `instances`, as they end.

@@ -47,24 +47,16 @@ _EXPECTED: Final = "an archive of one image, as `podman save` writes it"
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """An image that has been unpacked.
-
-    Parameters
-    ----------
-    root : str
-        The folder of its files.
-    command : tuple of str
-        What it runs unless told otherwise.
-    environment : Mapping
-        Its environment.
-    folder : str
-        Where it runs.
-    """
+    """An image that has been unpacked."""
 
     root: str
+    """The folder of its files."""
     command: tuple[str, ...]
+    """What it runs unless told otherwise."""
     environment: Mapping[str, str]
+    """Its environment."""
     folder: str
+    """Where it runs."""
 
 
 def unpacked(archive: Path, store: Path | None = None) -> Image:

@@ -41,18 +41,12 @@ INSTALL: Final = "scripts/system-packages.sh, or apt-get install bubblewrap libs
 
 @dataclass(frozen=True, slots=True)
 class Layers:
-    """The layers that a box has. Only a test takes one away from those that hold on a machine.
-
-    Parameters
-    ----------
-    names : frozenset of str
-        Of `NAMES`.
-    why : str
-        Why bubblewrap can't be used, if it can't.
-    """
+    """The layers that a box has. Only a test takes one away from those that hold on a machine."""
 
     names: frozenset[str] = frozenset(NAMES)
+    """Of `NAMES`."""
     why: str = ""
+    """Why bubblewrap can't be used, if it can't."""
 
     def __contains__(self, name: str) -> bool:
         return name in self.names

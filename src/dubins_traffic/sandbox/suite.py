@@ -135,21 +135,14 @@ PRELUDE: Final = "sandbox/attacks/prelude.py"
 
 @dataclass(frozen=True, slots=True)
 class Strike:
-    """What came of an attack.
-
-    Parameters
-    ----------
-    attack : Attack
-        The attack.
-    stopped : bool
-        Whether it was stopped.
-    words : str
-        By what, or what it got hold of.
-    """
+    """What came of an attack."""
 
     attack: Attack
+    """The attack."""
     stopped: bool
+    """Whether it was stopped."""
     words: str
+    """By what, or what it got hold of."""
 
 
 def strikes(layers: Layers, attacks: Sequence[Attack] = ATTACKS) -> Iterator[Strike]:

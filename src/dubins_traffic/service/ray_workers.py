@@ -30,28 +30,19 @@ log = structlog.get_logger("dubins_traffic.worker")
 
 @dataclass(frozen=True)
 class Task:
-    """What each actor is to do.
-
-    Parameters
-    ----------
-    url, token : str
-        The service, and the token of its workers.
-    name : str
-        What the service calls them; a number is added.
-    folder : str or None
-        For submissions, on each node; None: in the cache folder there.
-    trust : bool
-        As of `Worker`.
-    version : str
-        The version of this package that nodes must have.
-    """
+    """What each actor is to do."""
 
     url: str
     token: str
+    """`url`, `token`: the service, and the token of its workers."""
     name: str
+    """What the service calls them; a number is added."""
     folder: str | None = None
+    """For submissions, on each node; None: in the cache folder there."""
     trust: bool = False
+    """As of `Worker`."""
     version: str = version(PACKAGE)
+    """The version of this package that nodes must have."""
 
 
 class Carried:

@@ -48,17 +48,6 @@ REHEARSAL = 1.2
 class Pace:
     """The pace of a session: its clock, and how long drivers are waited for.
 
-    Parameters
-    ----------
-    lockstep : bool
-        Whether the simulation waits for a command of every remote car in each tick; otherwise it runs in real time.
-    factor : float
-        Speed of simulated time relative to the wall clock, in real time.
-    deadline : float
-        Seconds within which a command must come in lockstep.
-    patience : Patience
-        How long peers are waited for otherwise.
-
     Raises
     ------
     InputError
@@ -66,9 +55,13 @@ class Pace:
     """
 
     lockstep: bool = False
+    """Whether the simulation waits for a command of every remote car in each tick; otherwise it runs in real time."""
     factor: float = 1.0
+    """Speed of simulated time relative to the wall clock, in real time."""
     deadline: float = 5.0
+    """Seconds within which a command must come in lockstep."""
     patience: Patience = field(default_factory=Patience)
+    """How long peers are waited for otherwise."""
 
     def __post_init__(self) -> None:
         """Refuse values of which no clock can be made, before a transport is opened."""

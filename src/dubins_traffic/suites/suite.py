@@ -97,21 +97,14 @@ class SuiteModel(Strict):
 
 @dataclass(frozen=True)
 class Suite:
-    """A checked suite.
-
-    Attributes
-    ----------
-    document : Mapping
-        What its file says.
-    model : SuiteModel
-        The same, checked, with defaults.
-    file : str or None
-        The file from which it was read; None for a shipped suite.
-    """
+    """A checked suite."""
 
     document: Mapping[str, Any]
+    """What its file says."""
     model: SuiteModel
+    """The same, checked, with defaults."""
     file: str | None = field(default=None, compare=False)
+    """The file from which it was read; None for a shipped suite."""
 
     @staticmethod
     def from_document(document: Mapping[str, Any], file: str | None = None) -> Suite:

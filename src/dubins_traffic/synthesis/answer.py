@@ -99,27 +99,18 @@ VACUOUSLY: Final = "vacuously"
 
 @dataclass(frozen=True)
 class Answer:
-    """What synthesis says of an instance.
-
-    Attributes
-    ----------
-    solution : Solution
-        Who wins from which position.
-    instance : Instance
-        Of which it says so.
-    route_bound : int
-        Against how many e-agents an ego on shortest routes is proved to win.
-    seconds : float
-        Wall-clock time taken.
-    limit : int or None
-        Bytes of memory that may be used.
-    """
+    """What synthesis says of an instance."""
 
     solution: Solution
+    """Who wins from which position."""
     instance: Instance
+    """Of which it says so."""
     route_bound: int
+    """Against how many e-agents an ego on shortest routes is proved to win."""
     seconds: float
+    """Wall-clock time taken."""
     limit: int | None = field(repr=False)
+    """Bytes of memory that may be used."""
 
     @cached_property
     def starts(self) -> list[int]:

@@ -21,46 +21,30 @@ LARGEST_NODES: Final = 250
 
 @dataclass(frozen=True)
 class Node:
-    """A cell in an intersection.
-
-    Attributes
-    ----------
-    vertex : int
-        The intersection.
-    inbound : tuple of int
-        Lanes that end here; the place of a lane in this tuple is its slot.
-    exits : tuple of int
-        Lanes out.
-    crossing : bool
-        Whether the rules of crossings hold here.
-    """
+    """A cell in an intersection."""
 
     vertex: int
+    """The intersection."""
     inbound: tuple[int, ...]
+    """Lanes that end here; the place of a lane in this tuple is its slot."""
     exits: tuple[int, ...]
+    """Lanes out."""
     crossing: bool
+    """Whether the rules of crossings hold here."""
 
 
 @dataclass(frozen=True)
 class Arena:
-    """The cells of a network: its nodes 0 to V-1, then its lanes V to V+L-1.
-
-    Attributes
-    ----------
-    network : RoadNetwork
-        The roads.
-    order_degree : int
-        Least degree of an intersection that is a crossing.
-    goals : tuple of int
-        Intersections.
-    nodes : tuple of Node
-        In the order of their intersections.
-    """
+    """The cells of a network: its nodes 0 to V-1, then its lanes V to V+L-1."""
 
     network: RoadNetwork
+    """The roads."""
     order_degree: int
+    """Least degree of an intersection that is a crossing."""
     goals: tuple[int, ...]
+    """Intersections."""
     nodes: tuple[Node, ...]
+    """In the order of their intersections."""
 
     @classmethod
     def of(cls, network: RoadNetwork, goals: Sequence[int], order_degree: int = 1) -> Arena:

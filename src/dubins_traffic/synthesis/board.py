@@ -120,21 +120,14 @@ class Tables(NamedTuple):
 
 @dataclass(frozen=True)
 class Board:
-    """All positions of the ego and a number of e-agents on an arena.
-
-    Attributes
-    ----------
-    arena : Arena
-        The cells.
-    assumption : Assumption
-        What decides which positions there are, beside the cells.
-    others : int
-        E-agents, at most `MOST_OTHERS`.
-    """
+    """All positions of the ego and a number of e-agents on an arena."""
 
     arena: Arena
+    """The cells."""
     assumption: Assumption
+    """What decides which positions there are, beside the cells."""
     others: int
+    """E-agents, at most `MOST_OTHERS`."""
 
     @cached_property
     def _kinds(self) -> list[Kind]:

@@ -28,15 +28,10 @@ NEVER = np.int64(2**62)
 
 @dataclass
 class Counterstrategy:
-    """How the environment wins a game where the ego does not.
-
-    Parameters
-    ----------
-    solution : Solution
-        Who wins.
-    """
+    """How the environment wins a game where the ego does not."""
 
     solution: Solution
+    """Who wins."""
     _safe: dict[int, Flags] = field(default_factory=dict[int, Flags], repr=False)
     _turns: dict[tuple[int, int], Ints] = field(default_factory=dict[tuple[int, int], Ints], repr=False)
 
@@ -162,21 +157,14 @@ EGO_CAR = 0
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What stands where when the environment is to move.
-
-    Attributes
-    ----------
-    cells : tuple of int
-        Of each car, the ego's first.
-    orders : dict
-        For each node the lanes in which somebody waits in the order, first first.
-    rammed : bool
-        Whether an e-agent has driven into the ego.
-    """
+    """What stands where when the environment is to move."""
 
     cells: tuple[int, ...]
+    """Of each car, the ego's first."""
     orders: dict[int, tuple[int, ...]]
+    """For each node the lanes in which somebody waits in the order, first first."""
     rammed: bool = False
+    """Whether an e-agent has driven into the ego."""
 
 
 def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> list[str]:

@@ -39,30 +39,20 @@ IMPOSSIBLE: Final = -1
 
 @dataclass(frozen=True, slots=True)
 class Kind:
-    """Nodes whose scenes are the same.
-
-    Attributes
-    ----------
-    slots : int
-        Lanes that end at the node, at most `SLOTS`.
-    ordered : bool
-        Whether there is an order of arrival.
-    jumped : bool
-        Whether e-agents ignore that order.
-    forfeits : Forfeits
-        Whether they may give up their place.
-    parks : bool
-        Whether they may stay away from the end of the lane.
-    owed : bool
-        Whether an e-agent that may enter owes it (E3 at crossings, E5 elsewhere, if the way out allows).
-    """
+    """Nodes whose scenes are the same."""
 
     slots: int
+    """Lanes that end at the node, at most `SLOTS`."""
     ordered: bool
+    """Whether there is an order of arrival."""
     jumped: bool
+    """Whether e-agents ignore that order."""
     forfeits: Forfeits
+    """Whether they may give up their place."""
     parks: bool
+    """Whether they may stay away from the end of the lane."""
     owed: bool
+    """Whether an e-agent that may enter owes it (E3 at crossings, E5 elsewhere, if the way out allows)."""
 
     @classmethod
     def of(cls, slots: int, crossing: bool, assumed: Assumption) -> Kind:
@@ -80,21 +70,14 @@ class Kind:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Who is at a node.
-
-    Attributes
-    ----------
-    inside : int or None
-        `WHO.OTHER` or `WHO.EGO`.
-    queue : tuple of (slot, who)
-        Who waits, first in order first; without an order, sorted.
-    parked : tuple of int
-        Slots of those that have not come to the end of the lane, sorted.
-    """
+    """Who is at a node."""
 
     inside: int | None = None
+    """`WHO.OTHER` or `WHO.EGO`."""
     queue: tuple[tuple[int, int], ...] = ()
+    """Who waits, first in order first; without an order, sorted."""
     parked: tuple[int, ...] = ()
+    """Slots of those that have not come to the end of the lane, sorted."""
 
     @property
     def taken(self) -> int:
@@ -139,18 +122,12 @@ def scenes(kind: Kind, others: int) -> list[Scene]:
 
 @dataclass(frozen=True)
 class Scenery:
-    """The scenes of a kind and their changes, by number.
-
-    Attributes
-    ----------
-    kind : Kind
-        The kind.
-    scenes : list of Scene
-        By number.
-    """
+    """The scenes of a kind and their changes, by number."""
 
     kind: Kind
+    """The kind."""
     scenes: list[Scene]
+    """By number."""
 
     @cached_property
     def number(self) -> dict[Scene, int]:

@@ -151,24 +151,16 @@ NEW_TICKET: Final = "new_ticket"
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """How the road is seen.
-
-    Attributes
-    ----------
-    sight : float
-        The ego sees the cars within this distance, metres.
-    margin : float
-        How far from an intersection a car in its disc may be, metres.
-    look : int
-        Ticks after which it is asked again where unseen cars may be.
-    assume_ego : bool
-        Whether a place is assumed for the ego, too, while it is behind another car in its cell.
-    """
+    """How the road is seen."""
 
     sight: float
+    """The ego sees the cars within this distance, metres."""
     margin: float
+    """How far from an intersection a car in its disc may be, metres."""
     look: int
+    """Ticks after which it is asked again where unseen cars may be."""
     assume_ego: bool = False
+    """Whether a place is assumed for the ego, too, while it is behind another car in its cell."""
 
 
 class MoveList:

@@ -23,21 +23,18 @@ LOOK: Final = 0.1
 
 @dataclass(frozen=True)
 class Ranks:
-    """How to get to one goal: move to the position of lowest rank, and wait while the environment owes.
-
-    Attributes
-    ----------
-    rank : (N,) int32
-        0 at the goal, -1 where the ego does not get there.
-    start : (R,) int32
-        First rank of the layer of each rank. In a layer the ego waits; otherwise it gets to lower ranks in each turn.
-    debt : (R,) int16
-        What the environment owes in a layer (`game.Game.owed`), or -1 where it can't keep the ego in the layer.
-    """
+    """How to get to one goal: move to the position of lowest rank, and wait while the environment owes."""
 
     rank: Numbers
+    """Shape (N,). 0 at the goal, -1 where the ego does not get there."""
     start: Numbers
+    """Shape (R,). First rank of the layer of each rank. In a layer the ego waits; otherwise it gets to lower ranks
+    in each turn.
+    """
     debt: Cells
+    """Shape (R,). What the environment owes in a layer (`game.Game.owed`), or -1 where it can't keep the ego in the
+    layer.
+    """
 
 
 @dataclass(frozen=True)
@@ -50,46 +47,30 @@ class _Ranked:
 
 @dataclass(frozen=True)
 class Loss:
-    """Positions that are lost for one goal, once those lost before are avoided.
-
-    Attributes
-    ----------
-    goal : int
-        The goal that the environment can keep from the ego.
-    target : (N,) bool
-        Where the goal would have counted as reached.
-    lost : (N,) bool
-        The positions.
-    """
+    """Positions that are lost for one goal, once those lost before are avoided."""
 
     goal: int
+    """The goal that the environment can keep from the ego."""
     target: Flags
+    """Shape (N,). Where the goal would have counted as reached."""
     lost: Flags
+    """Shape (N,). The positions."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Who wins a game.
-
-    Attributes
-    ----------
-    game : Game
-        The game.
-    winning : (N,) bool
-        Where the ego wins.
-    vacuous : (N,) bool
-        Where it wins, but only by bringing the environment to where it can't keep its assumption.
-    ranks : tuple of Ranks
-        The strategy, one table a goal, for all winning positions that are not vacuous; it never does so.
-    losses : tuple of Loss
-        Why the others are lost, in order; none is lost twice.
-    """
+    """Who wins a game."""
 
     game: Game
+    """The game."""
     winning: Flags
+    """Shape (N,). Where the ego wins."""
     vacuous: Flags
+    """Shape (N,). Where it wins, but only by bringing the environment to where it can't keep its assumption."""
     ranks: tuple[Ranks, ...]
+    """The strategy, one table a goal, for all winning positions that are not vacuous; it never does so."""
     losses: tuple[Loss, ...] = field(repr=False)
+    """Why the others are lost, in order; none is lost twice."""
 
     @property
     def everywhere(self) -> bool:

@@ -40,18 +40,12 @@ VERSION: Final = 2
 
 @dataclass(frozen=True)
 class Strategy:
-    """How the ego wins.
-
-    Attributes
-    ----------
-    board : Board
-        What the numbers of positions mean.
-    ranks : tuple of Ranks
-        One table a goal, in the order of `Arena.goals`.
-    """
+    """How the ego wins."""
 
     board: Board
+    """What the numbers of positions mean."""
     ranks: tuple[Ranks, ...]
+    """One table a goal, in the order of `Arena.goals`."""
 
     @classmethod
     def of(cls, solution: Solution) -> Strategy:
@@ -183,21 +177,14 @@ def _header(archive: Archive) -> _Header:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What to do at the end of a lane.
-
-    Attributes
-    ----------
-    node : int
-        The intersection ahead.
-    enter : bool
-        Whether to enter it as soon as the rules allow, or to wait.
-    exits : tuple of int
-        Lanes out that are free in the game, the best first; empty where the ego may not enter yet.
-    """
+    """What to do at the end of a lane."""
 
     node: int
+    """The intersection ahead."""
     enter: bool
+    """Whether to enter it as soon as the rules allow, or to wait."""
     exits: tuple[int, ...]
+    """Lanes out that are free in the game, the best first; empty where the ego may not enter yet."""
 
 
 class Adviser(Protocol):

@@ -62,24 +62,16 @@ class Edge:
 
 @dataclass(frozen=True)
 class Explicit:
-    """A machine given by its edges; of several that fit a letter the first is taken.
-
-    Attributes
-    ----------
-    edges : Mapping
-        Of each state.
-    first : State
-        The state before the first letter.
-    names : sequence of str
-        All propositions.
-    sides : Sides or None
-        Which of them it reads and which it answers; None where its file does not say.
-    """
+    """A machine given by its edges; of several that fit a letter the first is taken."""
 
     edges: Mapping[State, Sequence[Edge]]
+    """Of each state."""
     first: State
+    """The state before the first letter."""
     names: Sequence[str]
+    """All propositions."""
     sides: Sides | None = None
+    """Which of them it reads and which it answers; None where its file does not say."""
     _outputs: dict[frozenset[str], list[str]] = field(
         default_factory=dict[frozenset[str], list[str]], init=False, repr=False, compare=False
     )
