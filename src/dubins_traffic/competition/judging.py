@@ -129,12 +129,8 @@ def judge(
 
     Parameters
     ----------
-    phase : Phase
-        Of a competition.
     numbers : iterable of int
         Which of its trials.
-    submission : Submission
-        Who drives.
     seeds : Mapping, optional
         The seeds by number; left out: those of the phase, which must be known then.
     trust : bool
@@ -294,14 +290,10 @@ def evaluate(
     ----------
     phase : Phase
         Of a competition; its seeds must be known.
-    submission : Submission
-        Who drives.
     folder : Path
         What comes of each trial is kept here as soon as it is known; made if missing.
     workers : int
         Processes; the results are the same with any number.
-    trust : bool
-        As for `judge`.
     records : bool
         Whether records are kept, in ``folder/records``.
     progress : callable, optional

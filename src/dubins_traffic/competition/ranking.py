@@ -92,8 +92,6 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
     ----------
     entries : Mapping
         What came of all trials of the phase for each entry, in any order.
-    phase : Phase
-        Whose ranking.
 
     Returns
     -------

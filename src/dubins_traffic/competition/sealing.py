@@ -292,10 +292,7 @@ def unsealed(phase: Seeded, key: bytes) -> Seeds:
 def publish(phase: Seeded, title: str, now: datetime | None = None) -> Published:
     """Write the commitment of a phase for everybody to see, and return it; a second time it is the same.
 
-    Raises
-    ------
-    InputError
-        If the seeds have not been sealed, another commitment has been published, or it can't be written.
+    InputError if the seeds have not been sealed, another commitment has been published, or it can't be written.
     """
     sealed = _sealed(phase)
     path = commitment_path(phase)

@@ -57,8 +57,6 @@ def visible(
 
     Parameters
     ----------
-    phase : Phase
-        In which it was handed in.
     state : SubmissionState
         Where it is.
     results : sequence of Judged

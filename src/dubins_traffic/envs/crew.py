@@ -52,8 +52,6 @@ class Blame:
 
     Parameters
     ----------
-    problem : Problem
-        What is judged.
     excuses : bool
         Whether it matters who broke first; else each side answers for all that it breaks.
 
@@ -119,15 +117,9 @@ class Crew:
     ----------
     instances : sequence of Instance
         One a trial; all have as many cars.
-    cast : Cast
-        Who drives what.
-    settings : Settings
-        What the environments of the trials have in common.
 
     Attributes
     ----------
-    group : Group
-        The trials.
     terms : (B, N, T)
         Terms of `envs.terms` of each car in the last step, but for breaches.
     broken : (B, N, P)
@@ -189,8 +181,6 @@ class Crew:
         ----------
         asked : (B, N, 2)
             What the cars that learners drive are to do, speed, m/s, and yaw rate, rad/s.
-        ticks : int
-            For how long.
         """
         self.terms[:] = 0.0
         self.broken[:] = 0

@@ -71,8 +71,6 @@ class Episodes:
 
     Parameters
     ----------
-    configuration : Configuration
-        What they are drawn from.
     levels : Levels, optional
         The pool of road networks; by default each trial has the network that its configuration says.
     """

@@ -34,8 +34,6 @@ class Renderer:
     ----------
     mode : str, optional
         One of `MODES`; without one nothing is shown.
-    width, height : int
-        Pixels.
     """
 
     def __init__(self, mode: str | None, width: int = SIDE, height: int = SIDE) -> None:

@@ -39,8 +39,6 @@ class ActionMap:
     kind : str
         ``continuous``: two numbers from -1 to 1, speed and yaw rate, scaled to the car's bounds. ``discrete``: one of
         the pairs of `SPEEDS` and `TURNS`.
-    bounds : Bounds
-        The car's.
 
     Attributes
     ----------

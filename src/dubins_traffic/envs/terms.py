@@ -135,8 +135,6 @@ class Pay:
             The terms of each car, but for breaches.
         broken : (N, P)
             How often each car has broken each of `PARTS`, where that counts.
-        car : int
-            The number of the car.
         """
         if car == EGO:
             costly: Floats = broken[EGO, :_FIRST].astype(np.float64)

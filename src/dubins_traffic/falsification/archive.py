@@ -41,11 +41,6 @@ class Journal:
 
     A trial is known by its number and the hash of its genome: another one of that number is run. A line begins with its
     checksum; what is not as it was written, such as a last line that was cut off, is passed over, and its trial run.
-
-    Parameters
-    ----------
-    path : Path
-        The file, which need not be there.
     """
 
     def __init__(self, path: Path) -> None:
@@ -209,8 +204,6 @@ def opened(folder: Path, settings: Any, *, resume: bool) -> Generator[Archive]:
 
     Parameters
     ----------
-    folder : Path
-        The folder.
     settings : JSON
         What is searched; a search that is resumed must have the same.
     resume : bool
@@ -262,8 +255,6 @@ def coverage_page(
         What tells the search from others: `controller`, `targets`, `seed`, `strategy`.
     counts : mapping
         What became of its trials, by the keys of `COUNTS`.
-    rows : sequence of Row
-        The coverage.
     cases : mapping
         What was found, by the names of the files.
     found_in : mapping

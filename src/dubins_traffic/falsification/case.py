@@ -133,8 +133,6 @@ def sentence_of(record: Record, score: Score, breach: Violation) -> str:
     ----------
     record, score
         The trial, up to the breach or farther.
-    breach
-        The ego's.
     """
     when = f"At {breach.time:.2f} s the ego"
     match breach.rule:

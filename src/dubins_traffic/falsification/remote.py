@@ -112,13 +112,7 @@ class Remote:
         self.close()
 
     def drive(self, instance: Instance) -> Record:
-        """Run a trial, and return its record.
-
-        Raises
-        ------
-        TransportError
-            If the transport is lost.
-        """
+        """Run a trial, and return its record; TransportError if the transport is lost."""
         self._next = instance
         if self._session is None:
             self._session = self._opened()

@@ -129,10 +129,6 @@ class Run:
 
     Parameters
     ----------
-    particles : list of Particle
-        The first ones.
-    paths : Paths
-        What came of them.
     below : float
         The margin that is rare.
     dice : Generator
@@ -276,8 +272,6 @@ class Watched:
 
     Parameters
     ----------
-    group : Group
-        The trials; of one control rate.
     rule : str
         One of `MEASURED`.
     """
@@ -304,10 +298,7 @@ class Watched:
     def advance(self, ticks: int) -> None:
         """Take all trials some ticks farther.
 
-        Raises
-        ------
-        ControllerError
-            If one of them ends by a fault: then there is no estimate.
+        ControllerError if one of them ends by a fault: then there is no estimate.
         """
         self.group.drive(ticks)
         for instance, ending in zip(self.group.instances, self.group.endings, strict=True):

@@ -224,12 +224,8 @@ class Cma:
 
     It begins anew, with another drawn trial, where it has converged or found a failure.
 
-    Source: N. Hansen, "The CMA evolution strategy: a tutorial", arXiv:1604.00772.
-
-    Raises
-    ------
-    MissingExtraError
-        Without the extra `falsify`.
+    Source: N. Hansen, "The CMA evolution strategy: a tutorial", arXiv:1604.00772. MissingExtraError without the extra
+    `falsify`.
     """
 
     def __init__(self, source: Source, targets: Sequence[str]) -> None:

@@ -124,12 +124,7 @@ class TrialRunner:
         """Run the trials of instances; yield what came of some, by their places in `instances`, as they end.
 
         What runs without asking anybody in Python runs together, and so does what one controller drives; else no more
-        trials than `fitting` says.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            When it is cancelled.
+        trials than `fitting` says. KeyboardInterrupt when it is cancelled.
         """
         places = {id(own): k for k, own in enumerate(instances)}
         ways = {Way.ALONE: list(instances)} if self._remote is not None else self._egos.ways(instances)

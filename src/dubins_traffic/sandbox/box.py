@@ -76,15 +76,6 @@ class Box:
 
     A box ends with the thread that began it, too: the kernel kills it then.
 
-    Parameters
-    ----------
-    program : Program
-        What runs in it.
-    limits : Limits
-        What it may use.
-    layers : Layers
-        Which layers it has.
-
     Attributes
     ----------
     bank : float

@@ -48,20 +48,7 @@ def trees() -> Trees:
 
 
 class Group:
-    """The control group of one box.
-
-    Parameters
-    ----------
-    where : Trees
-        Where it is made.
-    limits : Limits
-        Its memory and processes.
-
-    Raises
-    ------
-    OSError
-        If it can't be made after all.
-    """
+    """The control group of one box; OSError if it can't be made after all."""
 
     def __init__(self, where: Trees, limits: Limits) -> None:
         name = f"{NAME}-{os.getpid()}-{next(_numbers)}"

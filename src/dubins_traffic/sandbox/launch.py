@@ -75,12 +75,6 @@ def command_line(
 
     Parameters
     ----------
-    program : Program
-        What runs in it.
-    limits : Limits
-        What it may use.
-    layers : Layers
-        Which layers it has.
     doors : sequence of str
         Files of its control group into which the first process writes its number.
     seccomp : int

@@ -21,10 +21,7 @@ MIB: Final = 1 << 20
 class Limits:
     """What a controller in a box may use in one trial. Processor time is that of all its processes together.
 
-    Raises
-    ------
-    InputError
-        If a limit is not a positive number; `bank_seconds` may be 0.
+    InputError if a limit is not a positive number; `bank_seconds` may be 0.
     """
 
     start_seconds: float = 60.0

@@ -160,12 +160,6 @@ class Processes:
 
     Parameters
     ----------
-    program : Program
-        What runs in the box.
-    limits : Limits
-        What it may use.
-    layers : Layers
-        The layers of the box.
     prints : bool
         Whether what is printed goes where this process prints.
 

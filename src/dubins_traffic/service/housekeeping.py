@@ -27,8 +27,6 @@ def end_silent(service: Service, *, was_away: bool = False) -> None:
 
     Parameters
     ----------
-    service : Service
-        The service.
     was_away : bool
         The service or its database was away until now, for some writers at least. Workers could not renew their
         leases then, so all leases begin anew.

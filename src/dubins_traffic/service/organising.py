@@ -35,14 +35,10 @@ def create(service: Service, slug: str, given: Mapping[str, bytes], by: Account 
 
     Parameters
     ----------
-    service : Service
-        The service.
     slug : str
         Its address: lower letters, digits and hyphens.
     given : Mapping
         Name of a file to its bytes; a single one may be called as it likes.
-    by : Account or None
-        Who does it.
 
     Raises
     ------
@@ -233,17 +229,7 @@ Run the entry on the first place again, and compare its rows:
 
 
 def export(service: Service, session: Session, row: Competition) -> bytes:
-    """Return a competition as a zip archive; phases that are still open are left out.
-
-    Parameters
-    ----------
-    service : Service
-        The service.
-    session : Session
-        A reader's.
-    row : Competition
-        Which one.
-    """
+    """Return a competition as a zip archive; phases that are still open are left out."""
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in _entries(service, session, row):

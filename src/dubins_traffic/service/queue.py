@@ -87,14 +87,6 @@ def release(session: Session, chunk: Chunk, note: str, at: float, *, worker_left
 
     Parameters
     ----------
-    session : Session
-        A writer's.
-    chunk : Chunk
-        The chunk, on lease.
-    note : str
-        Why.
-    at : float
-        Now.
     worker_left : bool
         The worker gave it back in order; this attempt is not counted.
 

@@ -40,10 +40,7 @@ class Place:
 def listen(place: Place) -> socket.socket:
     """Return a socket that listens at a place.
 
-    Raises
-    ------
-    InputError
-        If somebody else does, or it is no place of this machine.
+    InputError if somebody else does, or it is no place of this machine.
     """
     try:
         family = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)[0][0]
@@ -191,16 +188,10 @@ def serve(
 
     Parameters
     ----------
-    service : Service
-        Whose tables are up to date.
-    opened : socket
-        Where to listen.
     workers : int
         How many workers to keep beside the server.
     program : sequence of str
         The command of a worker, without its arguments.
-    trust : bool
-        As for workers.
     """
     config = uvicorn.Config(
         create_app(service),

@@ -99,10 +99,7 @@ def admitted(
 ) -> Submission | None:
     """Return the submission that an upload is the same as, None if it is a new one; it may be taken in.
 
-    Raises
-    ------
-    RefusedError
-        As for `receive`, of which this is the part that keeps nothing.
+    RefusedError as for `receive`, of which this is the part that keeps nothing.
     """
     if account.team_id is None:
         raise RefusedError("you are in no team: join or found one first")
@@ -221,14 +218,8 @@ def record(
 
     Parameters
     ----------
-    session : Session
-        A writer's.
-    chunk : Chunk
-        The chunk, on lease.
     results : sequence of dict
         For each of its trials, or its first, `number`, `row`, `end`, `owner`, `log`, `frames`, `ran` and its replays.
-    at : float
-        Now.
     hiding : Hiding
         Of the phase.
 

@@ -253,10 +253,7 @@ def replay_of(found: Record) -> str:
 def check_boxes(*, trust: bool) -> None:
     """Refuse to work where this machine can't hold a stranger's program, unless submissions are trusted.
 
-    Raises
-    ------
-    InputError
-        With the layers of the box that are missing.
+    InputError with the layers of the box that are missing.
     """
     if not trust:
         available_layers().require()
@@ -274,8 +271,6 @@ def until_signalled(worker: Worker, *, with_parent: bool = False) -> None:
 
     Parameters
     ----------
-    worker : Worker
-        Which.
     with_parent : bool
         End at once when the process at the other end of standard input has ended.
     """

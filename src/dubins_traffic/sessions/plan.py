@@ -48,10 +48,7 @@ REHEARSAL = 1.2
 class Pace:
     """The pace of a session: its clock, and how long drivers are waited for.
 
-    Raises
-    ------
-    InputError
-        If a value is out of range.
+    InputError if a value is out of range.
     """
 
     lockstep: bool = False
@@ -98,10 +95,8 @@ class SessionPlan:
     def claim(self, transport: str) -> SessionPlan:
         """Return this plan for the transport of that name, after preparing the folder for records.
 
-        Raises
-        ------
-        InputError
-            If the folder holds records that are neither to be removed nor of this session; see `record_folder.claim`.
+        InputError if the folder holds records that are neither to be removed nor of this session; see
+        `record_folder.claim`.
         """
         if self.records is None:
             return self

@@ -190,10 +190,7 @@ def _is_result(path: Path) -> bool:
 def load_results(path: Path) -> tuple[ResultModel, WallModel | None]:
     """Return the results in a file, and the seconds beside it if they are there.
 
-    Raises
-    ------
-    InputError
-        If a file can't be read, or is not as its schema says.
+    InputError if a file can't be read, or is not as its schema says.
     """
     found = parse(ResultModel, parse_json(read_text(path), str(path)), file=str(path))
     beside = wall_path(path)
@@ -214,8 +211,6 @@ def part(
 
     Parameters
     ----------
-    columns : Mapping
-        Their results, the columns `KEPT`.
     seconds : Mapping or None
         The wall-clock figures, if there are any.
     numbers : sequence of int

@@ -160,8 +160,6 @@ class Suite:
 
         Parameters
         ----------
-        controllers : sequence of str
-            The controllers to run.
         trials : int, optional
             Number of trials of each combination, if only the first ones are to be run.
         places : tuple of str, optional

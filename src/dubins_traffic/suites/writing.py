@@ -51,10 +51,7 @@ class Answers:
 def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
     """Return the files of results by name: `PAGE`, `TABLE`, and of a suite of trials CSV; same sources, same texts.
 
-    Raises
-    ------
-    InputError
-        As `compare_trials`, `columns_of` and `answers_of`.
+    InputError as `compare_trials`, `columns_of` and `answers_of`.
     """
     told = [line for line in (where_they_ran(sources), made_by(sources)) if line]
     how = " ".join(told)
@@ -91,12 +88,8 @@ def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
 def write_results(suite: Suite, sources: Sequence[Source], folder: Path, *, overwrite: bool = False) -> str:
     """Write the files of results into a folder and return the table in Markdown.
 
-    Files that are there are replaced only if `overwrite` is given.
-
-    Raises
-    ------
-    InputError
-        As `results`, if a path is refused (`files.require_output`), or if a file can't be written.
+    Files that are there are replaced only if `overwrite` is given. InputError as `results`, if a path is refused
+    (`files.require_output`), or if a file can't be written.
     """
     found = results(suite, sources)
     make_folder(folder, "results")

@@ -245,8 +245,6 @@ def answer(
 
     Parameters
     ----------
-    instance : Instance
-        Roads, goals, starts and e-agents.
     cars : int, optional
         E-agents; those of the instance, if not given.
     assumption : Assumption, optional

@@ -60,8 +60,6 @@ class Archive:
 
     Parameters
     ----------
-    path : str or Path
-        The file.
     what : str
         What it should be, for messages.
 

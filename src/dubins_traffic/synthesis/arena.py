@@ -52,8 +52,6 @@ class Arena:
 
         Parameters
         ----------
-        network : RoadNetwork
-            The roads.
         goals : sequence of int
             Intersections that the ego is to visit; each counts once.
         order_degree : int

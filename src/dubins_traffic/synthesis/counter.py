@@ -172,8 +172,6 @@ def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> li
 
     Parameters
     ----------
-    counter : Counterstrategy
-        How it plays.
     position : int
         A lost position; where it begins.
     turns : int

@@ -194,15 +194,9 @@ def build(
 
     Parameters
     ----------
-    board : Board
-        The positions.
     limit : int, optional
         Bytes of memory that may be used; half of what the machine has, if not given. A game that would take more is
         built lean.
-    progress : callable, optional
-        Told about it now and then.
-    workers : int
-        Threads.
 
     Raises
     ------

@@ -36,13 +36,7 @@ class Sighting(NamedTuple):
 
 
 class Ground:
-    """The cells of an arena as places on the road.
-
-    Parameters
-    ----------
-    arena : Arena
-        The cells.
-    """
+    """The cells of an arena as places on the road."""
 
     def __init__(self, arena: Arena) -> None:
         network = arena.network
@@ -190,12 +184,8 @@ class RoadPlay:
 
     Parameters
     ----------
-    board : Board
-        The game.
     sight : Sight
         How the road is seen.
-    names : sequence of str
-        Of the cars, the ego first.
 
     Attributes
     ----------

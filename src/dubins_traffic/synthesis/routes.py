@@ -20,8 +20,6 @@ def route_bound(arena: Arena, assumption: Assumption) -> int:
 
     Parameters
     ----------
-    arena : Arena
-        The cells.
     assumption : Assumption
         The proof needs E1 to E5, E4 in full, that forfeits are bounded, and crossings wherever three roads meet; it
         does not need E6. Without these the bound is 0.

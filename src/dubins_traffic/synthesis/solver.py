@@ -122,10 +122,6 @@ def solve(game: Game, *, progress: Progress | None = None, workers: int = WORKER
 
     Parameters
     ----------
-    game : Game
-        The game.
-    progress : callable, optional
-        Told about it now and then.
     workers : int
         Threads; no more than there are goals are used.
     """

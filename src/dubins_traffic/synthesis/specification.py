@@ -47,10 +47,7 @@ FORMS: Final = {".structuredslugs": "slugs", ".tlsf": "tlsf", ".py": "tulip"}
 def specification_text(board: Board, starts: Sequence[int], ending: str) -> str:
     """Return the game as a specification in the format that an ending of files stands for.
 
-    Raises
-    ------
-    InputError
-        As `specification`, and for another ending.
+    InputError as `specification`, and for another ending.
     """
     if ending not in FORMS:
         expected = f"a name that ends in {', '.join(FORMS)}"
@@ -98,8 +95,6 @@ def specification(board: Board, starts: Sequence[int]) -> Specification:
 
     Parameters
     ----------
-    board : Board
-        The positions.
     starts : sequence of int
         The cells in which the cars start, the ego first; no two the same.
 

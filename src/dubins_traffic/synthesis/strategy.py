@@ -229,8 +229,6 @@ def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Adv
 
     Parameters
     ----------
-    strategy : Strategy
-        The ego's.
     play : RoadPlay
         Where the play is.
     goal, following : int
@@ -270,17 +268,7 @@ class StrategyError(DubinsTrafficError):
 def check(game: Game, ranks: Sequence[Ranks]) -> None:
     """Check that the ego wins by these ranks from every position that has one.
 
-    Parameters
-    ----------
-    game : Game
-        The game.
-    ranks : sequence of Ranks
-        One table a goal.
-
-    Raises
-    ------
-    StrategyError
-        If it does not: names the first position where a condition above fails.
+    StrategyError if it does not: names the first position where a condition above fails.
     """
     for goal, own in enumerate(ranks):
         following = ranks[(goal + 1) % len(ranks)]

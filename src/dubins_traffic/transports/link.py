@@ -126,10 +126,7 @@ class Link:
     def command(self, car: str, tick: int) -> tuple[float, float]:
         """Return the speed and yaw rate of `car` that answer frame `tick`, or that are in force.
 
-        Raises
-        ------
-        PeerError
-            If there are none: the peer is silent, gone or at fault, or all is to end.
+        PeerError if there are none: the peer is silent, gone or at fault, or all is to end.
         """
         slot = self.inbox.slot(car)
         until = self.clock.until(tick, self._sent)
@@ -409,13 +406,7 @@ def onward(before: State, seconds: float) -> State:
 
 
 class Sights:
-    """What each car of one trial sees.
-
-    Parameters
-    ----------
-    instance : Instance
-        The instance of the trial.
-    """
+    """What each car of one trial sees."""
 
     def __init__(self, instance: Instance) -> None:
         self._instance = instance

@@ -97,15 +97,7 @@ MEASURED: Final = "ros1-world"
 
 
 class Replayed:
-    """Drives some cars by their recorded commands (a `protocols.Driver`).
-
-    Parameters
-    ----------
-    frames : Frames
-        The whole trial.
-    cars : sequence of int
-        Which of its cars.
-    """
+    """Drives some cars by their recorded commands (a `protocols.Driver`)."""
 
     def __init__(self, frames: Frames, cars: Sequence[int]) -> None:
         self._cars = list(cars)

@@ -124,8 +124,6 @@ class Bodies:
 
     Parameters
     ----------
-    app : ASGIApp
-        What is asked then.
     largest : int
         Bytes of a file.
     """

@@ -30,15 +30,7 @@ class Place(NamedTuple):
 
 
 class Labelled:
-    """The game with cars that have names.
-
-    Parameters
-    ----------
-    board : Board
-        The game.
-    moves : MoveList
-        Its moves.
-    """
+    """The game with cars that have names."""
 
     def __init__(self, board: Board, moves: MoveList) -> None:
         self.board = board
@@ -176,10 +168,6 @@ class MachineAdviser:
 
     Parameters
     ----------
-    board : Board
-        The game.
-    machine : Machine
-        The strategy.
     fallback : bool
         Whether the ego goes on without the machine where that makes no move of the game.
     """

@@ -75,13 +75,7 @@ def observation_from_message(message: state_t, problem: Problem) -> Observation:
 
 
 class Encoder:
-    """Encodes the messages of every tick of one trial as their classes do, but some times as fast.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the cars.
-    """
+    """Encodes the messages of every tick of one trial as their classes do, but some times as fast."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._state = state_t().encode()[:FINGERPRINT]

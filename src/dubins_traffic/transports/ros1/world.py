@@ -75,8 +75,6 @@ class World:
     ----------
     topics : Topics
         Has the publishers, which outlive the instance.
-    instance : Instance
-        Whose cars.
     clock : bool
         Whether `/clock` is published.
     simulated : bool
