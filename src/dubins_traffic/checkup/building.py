@@ -61,7 +61,7 @@ def build(folder: Path | None = None, progress: Progress | None = None) -> Built
     where, reason = _checked_folder(folder), _hindrance()
     if reason and folder is not None:
         raise InputError(reason, file="--folder", value=str(folder), expected="none here")
-    files = {own.kernel.key(own.kinds): _file_of(own) for own in entries()}
+    files = {entry.kernel.key(entry.kinds): _file_of(entry) for entry in entries()}
     failed = _compiled(progress)
     if failed or reason:
         return Built(None, reason, len(files), failed)
@@ -84,7 +84,7 @@ def entries() -> list[Entry]:
     with listed() as found:
         for run in moments():
             run()
-    return [own for own in found if own.kernel.__module__.startswith(OURS)]
+    return [entry for entry in found if entry.kernel.__module__.startswith(OURS)]
 
 
 def _checked_folder(folder: Path | None) -> Path:
@@ -120,13 +120,13 @@ def _compiled(progress: Progress | None) -> list[str]:
     done, whole = -1, len(_waiting)
     try:
         while done < whole:
-            now = sum(own.is_there() or bool(own.failure) or own.wish.path.exists() for own in _waiting)
+            now = sum(one.is_there() or bool(one.failure) or one.wish.path.exists() for one in _waiting)
             if now != done and progress is not None:
                 progress(now, whole)
             done = now
             if done < whole:
                 sleep(PAUSE)
-        return [f"{own.wish.name}: {own.failure.splitlines()[-1]}" for own in _waiting if own.failure]
+        return [f"{one.wish.name}: {one.failure.splitlines()[-1]}" for one in _waiting if one.failure]
     except BaseException:
         beside.end()
         raise

@@ -246,7 +246,8 @@ class Phase:
         return digest(
             {
                 "configurations": [
-                    {"name": own.name, "document": own.configuration.inlined()} for own in self.configurations
+                    {"name": named.name, "document": named.configuration.inlined()}
+                    for named in self.configurations
                 ],
                 "trials": self.model.trials,
                 "limits": self.model.limits.model_dump(),
@@ -332,15 +333,15 @@ class Competition:
         InputError
             For the first thing wrong, with its field.
         """
-        own = plain(_dated(document), file)
-        model = parse(CompetitionModel, own, file=file)
+        plain_document = plain(_dated(document), file)
+        model = parse(CompetitionModel, plain_document, file=file)
         try:
             check_names([entry.name for entry in model.configurations], "configurations")
             found = tuple(
                 Named(entry.name, configuration_of(entry, k, folder))
                 for k, entry in enumerate(model.configurations)
             )
-            made = Competition(_complete(own, found), model, found, file, folder)
+            made = Competition(_complete(plain_document, found), model, found, file, folder)
             for name in model.phases:
                 _check_phase(made.phase(name))
         except InputError as error:
@@ -376,7 +377,7 @@ class Competition:
         if model is None:
             expected = f"one of {', '.join(self.model.phases)}"
             raise InputError("no such phase", file=self.file, field="phases", value=name, expected=expected)
-        known = {own.name: own for own in self.configurations}
+        known = {named.name: named for named in self.configurations}
         for k, wanted in enumerate(model.configurations or ()):
             if wanted not in known:
                 raise InputError(
@@ -419,7 +420,7 @@ def _dated(value: object) -> Any:
 
 
 def _complete(document: dict[str, Any], configurations: tuple[Named, ...]) -> dict[str, Any]:
-    entries = [{"name": own.name, "document": own.configuration.inlined()} for own in configurations]
+    entries = [{"name": named.name, "document": named.configuration.inlined()} for named in configurations]
     return {**document, "configurations": entries}
 
 
@@ -432,13 +433,13 @@ def _check_phase(phase: Phase) -> None:
             value=len(phase.numbers),
             expected=f"at most {MOST_TRIALS} in all",
         )
-    check_names([own.name for own in phase.configurations], f"{where}.configurations")
+    check_names([named.name for named in phase.configurations], f"{where}.configurations")
     if phase.ranking.metric == "icra2016":
-        for own in phase.configurations:
-            if weight_of(draw(own.configuration)) is None:
+        for named in phase.configurations:
+            if weight_of(draw(named.configuration)) is None:
                 raise InputError(
                     "the score of ICRA 2016 is not defined here",
                     field="ranking.metric",
-                    value=own.name,
+                    value=named.name,
                     expected="configurations on a grid, whose e-agents are called agent...",
                 )

@@ -184,17 +184,17 @@ def _judged(
         return _failed(number, str(error))
     row = rows.row(number, result.ending, result.score, {})
     end = result.ending.end.value
-    own = {name: _plain(row[name]) for name in rows.RESULT}
+    kept_row = {name: _plain(row[name]) for name in rows.RESULT}
     return Judged(
-        number=number, row=own, end=end, owner=OWNERS.get(end), log=seat.log_tail, frames=digest.result(),
+        number=number, row=kept_row, end=end, owner=OWNERS.get(end), log=seat.log_tail, frames=digest.result(),
         ran=registry.ran(name), recorded=recorded.getvalue() or None,
     )  # fmt: skip
 
 
 def _failed(number: int, reason: str) -> Judged:
     row = rows.failure(number, rows.FAILED, reason)
-    own = {name: row[name] for name in rows.RESULT}
-    return Judged(number=number, row=own, end=rows.FAILED, owner="platform", log="", frames=None)
+    kept_row = {name: row[name] for name in rows.RESULT}
+    return Judged(number=number, row=kept_row, end=rows.FAILED, owner="platform", log="", frames=None)
 
 
 def _plain(value: object) -> Any:
@@ -210,7 +210,7 @@ def _make(folder: Path) -> None:
 
 
 ARRAYS: Final = tuple(
-    own.name for own in fields(Frames) if own.name not in ("first", "rate", "contacts", "events")
+    array.name for array in fields(Frames) if array.name not in ("first", "rate", "contacts", "events")
 )
 """The arrays of a block of frames, (F, N)."""
 
@@ -266,7 +266,7 @@ class Evaluation:
 
     def to_json(self) -> dict[str, Any]:
         """Return the evaluation as a JSON object."""
-        return {**self.head, "trials": [own.to_json() for own in self.results]}
+        return {**self.head, "trials": [result.to_json() for result in self.results]}
 
     @property
     def head(self) -> dict[str, Any]:
@@ -310,15 +310,15 @@ def evaluate(
     _make_results(folder)
     with locked(folder):
         known = _begun(phase, submission, folder)
-        found = {own.number: own for own in known.results if own.counts}
+        found = {result.number: result for result in known.results if result.counts}
         left = [number for number in phase.numbers if number not in found]
         work = _Work(phase, submission, seeds, trust, folder / "records" if records else None)
         if progress is not None:
             progress(len(found), len(phase.numbers))
         with contextlib.closing(_run(work, left, workers)) as results:
-            for own in results:
-                found[own.number] = own
-                _append(folder / RESULTS, _line(own.to_json()))
+            for judged in results:
+                found[judged.number] = judged
+                _append(folder / RESULTS, _line(judged.to_json()))
                 if progress is not None:
                     progress(len(found), len(phase.numbers))
         done = Evaluation(phase.name, phase.rules, submission.digest, tuple(found[k] for k in sorted(found)))
@@ -345,15 +345,15 @@ def load_evaluation(place: Path) -> Evaluation:
         )
     found: dict[int, Judged] = {}
     for k, line in enumerate(lines[1:], 2):
-        own = Judged.from_json(_json(line, path, k), f"{path}: line {k}")
-        found[own.number] = own
+        judged = Judged.from_json(_json(line, path, k), f"{path}: line {k}")
+        found[judged.number] = judged
     results = tuple(found[number] for number in sorted(found))
     return Evaluation(head["phase"], head["rules"], head["submission"], results)
 
 
 def kept(folder: Path) -> int:
     """Return how many trials an evaluation has results of."""
-    return sum(own.counts for own in load_evaluation(folder).results)
+    return sum(result.counts for result in load_evaluation(folder).results)
 
 
 def load_entries(places: Sequence[str], phase: Phase) -> dict[str, tuple[Judged, ...]]:
@@ -375,17 +375,17 @@ def load_entries(places: Sequence[str], phase: Phase) -> dict[str, tuple[Judged,
     for text in places:
         name, equals, place = text.rpartition("=")
         name = name if equals else Path(place).resolve().name
-        own = load_evaluation(Path(place))
-        if (own.phase, own.rules) != (phase.name, phase.rules):
+        evaluation = load_evaluation(Path(place))
+        if (evaluation.phase, evaluation.rules) != (phase.name, phase.rules):
             raise InputError(
                 "results of another phase, or under other rules",
                 file=place,
-                value=own.phase,
+                value=evaluation.phase,
                 expected=phase.name,
             )
         if name in found:
             raise InputError("name taken", file=place, value=name, expected="NAME=DIR, each name once")
-        found[name] = own.results
+        found[name] = evaluation.results
     return found
 
 
@@ -457,7 +457,7 @@ def _begun(phase: Phase, submission: Submission, folder: Path) -> Evaluation:
 
 def _write(found: Evaluation, folder: Path) -> None:
     """Write the results in the order of their numbers: the same bytes whatever the order in which they came."""
-    text = _line(found.head) + "".join(_line(own.to_json()) for own in found.results)
+    text = _line(found.head) + "".join(_line(result.to_json()) for result in found.results)
     replace_file(folder / RESULTS, lambda neighbour: neighbour.write_text(text, encoding="utf-8"))
 
 

@@ -105,30 +105,30 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
     """
     found = sorted(
         (_entry(name, results, phase) for name, results in sorted(entries.items())),
-        key=lambda own: _merit(own, phase),
+        key=lambda entry: _merit(entry, phase),
         reverse=True,
     )
     apart = {(one.first, one.second): one for one in _differences(found, phase)}
     places: list[Place] = []
-    for k, own in enumerate(found):
-        equal = k > 0 and _merit(own, phase) == _merit(found[k - 1], phase)
+    for k, entry in enumerate(found):
+        equal = k > 0 and _merit(entry, phase) == _merit(found[k - 1], phase)
         beside = [
-            (one.second if one.first == own.name else one.first)
+            (one.second if one.first == entry.name else one.first)
             for one in apart.values()
-            if own.name in (one.first, one.second) and holds_zero(one.estimate)
+            if entry.name in (one.first, one.second) and holds_zero(one.estimate)
         ]
-        following = apart[own.name, found[k + 1].name].estimate if k + 1 < len(found) else None
-        count = len(own.values)
+        following = apart[entry.name, found[k + 1].name].estimate if k + 1 < len(found) else None
+        count = len(entry.values)
         places.append(
             Place(
                 places[-1].place if equal else k + 1,
-                own.name,
+                entry.name,
                 count,
-                _estimated(own.values.tobytes()),
-                own.second,
-                share(own.satisfied, count),
-                share(own.clean, count - own.cut),
-                own.cut,
+                _estimated(entry.values.tobytes()),
+                entry.second,
+                share(entry.satisfied, count),
+                share(entry.clean, count - entry.cut),
+                entry.cut,
                 tuple(sorted(beside)),
                 following,
             )
@@ -149,14 +149,14 @@ def ranking_document(entries: Mapping[str, Sequence[Result]], phase: Phase) -> d
         "places": [place.to_json() for place in rank(entries, phase)],
         "differences": [
             {
-                "first": own.first,
-                "second": own.second,
-                "mean": own.estimate.mean,
-                "interval": _ends(own.estimate.mean_interval),
-                "first_larger": own.larger,
-                "first_smaller": own.smaller,
+                "first": difference.first,
+                "second": difference.second,
+                "mean": difference.estimate.mean,
+                "interval": _ends(difference.estimate.mean_interval),
+                "first_larger": difference.larger,
+                "first_smaller": difference.smaller,
             }
-            for own in differences(entries, phase)
+            for difference in differences(entries, phase)
         ],
     }
 
@@ -204,7 +204,7 @@ def holds_zero(found: Estimate) -> bool:
 
 
 def _entry(name: str, results: Sequence[Result], phase: Phase) -> _Entry:
-    rows = sorted((_row(own) for own in results), key=lambda row: row["number"])
+    rows = sorted((_row(result) for result in results), key=lambda row: row["number"])
     numbers = [row["number"] for row in rows]
     left = missing(results, phase)
     if left or numbers != list(phase.numbers):
@@ -221,9 +221,9 @@ def _entry(name: str, results: Sequence[Result], phase: Phase) -> _Entry:
     return _Entry(name, values, mean, second, *counts)
 
 
-def _merit(own: _Entry, phase: Phase) -> tuple[float, float, int]:
-    second = own.second if phase.ranking.metric == "counted_rounds" else 0.0
-    return own.mean, second, own.satisfied if phase.ranking.ties == "satisfied" else 0
+def _merit(entry: _Entry, phase: Phase) -> tuple[float, float, int]:
+    second = entry.second if phase.ranking.metric == "counted_rounds" else 0.0
+    return entry.mean, second, entry.satisfied if phase.ranking.ties == "satisfied" else 0
 
 
 def _differences(found: Sequence[_Entry], phase: Phase) -> list[Difference]:

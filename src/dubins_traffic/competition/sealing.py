@@ -254,7 +254,7 @@ def seal(phase: Seeded, key: bytes, seeds: Seeds | None = None, *, overwrite: bo
     salt, nonce = secrets.token_bytes(16), secrets.token_bytes(12)
     head = {"version": 1, "phase": phase.name, "commitment": seeds.commitment}
     hidden = cipher_of(key, salt).encrypt(nonce, seeds.text.encode(), _bound(head))
-    texts = {name: _text(own) for name, own in (("salt", salt), ("nonce", nonce), ("sealed", hidden))}
+    texts = {name: _text(data) for name, data in (("salt", salt), ("nonce", nonce), ("sealed", hidden))}
     _write(path, dumps(Sealed.model_validate({**head, **texts}).model_dump()))
     return seeds.commitment
 

@@ -75,8 +75,8 @@ def check_apart(folder: Path, results: Path) -> None:
 
     InputError if `results` lies in `folder` and would be read as a part of it.
     """
-    own, place = folder.resolve(), results.resolve()
-    if folder.is_dir() and place.is_relative_to(own) and _is_kept(place.relative_to(own).as_posix()):
+    whole, place = folder.resolve(), results.resolve()
+    if folder.is_dir() and place.is_relative_to(whole) and _is_kept(place.relative_to(whole).as_posix()):
         raise InputError(
             "lies in what is evaluated",
             file=str(results),
@@ -135,7 +135,7 @@ def without_folder(files: dict[str, bytes], wanted: frozenset[str]) -> dict[str,
 
 def _walk(folder: Path) -> Iterator[Path]:
     with os.scandir(folder) as entries:
-        for entry in sorted(entries, key=lambda own: own.name):
+        for entry in sorted(entries, key=lambda item: item.name):
             if not _is_kept(entry.name):
                 continue
             kind = entry.stat(follow_symlinks=False).st_mode
@@ -414,7 +414,7 @@ def _store(files: dict[str, bytes], program: str | None, path: Path) -> None:
                     file.flush()
                     os.fsync(file.fileno())
                 place.chmod(0o755 if name == program else 0o644)
-            for folder in (new, *(own for own in new.rglob("*") if own.is_dir())):
+            for folder in (new, *(item for item in new.rglob("*") if item.is_dir())):
                 folder.chmod(0o755)
             try:
                 new.rename(path)

@@ -81,7 +81,7 @@ def visible(
         "done": len(results),
         "of": len(phase.numbers),
         "summary": summary(phase, results),
-        "trials": [own.to_json() for own in sorted(results, key=lambda own: own.number)],
+        "trials": [result.to_json() for result in sorted(results, key=lambda result: result.number)],
     }
 
 
@@ -97,7 +97,7 @@ def _head(phase: Phase, state: SubmissionState) -> dict[str, Any]:
 
 def _hidden(phase: Phase, state: SubmissionState, results: Sequence[Judged]) -> dict[str, Any]:
     """Return what may be seen of a submission whose trials are secret."""
-    ours = state.owner == "platform" or any(own.owner == "platform" for own in results)
+    ours = state.owner == "platform" or any(result.owner == "platform" for result in results)
     before = state.state in _BEFORE_TRIALS
     return {
         **_head(phase, state),
@@ -116,9 +116,9 @@ def _aggregates(phase: Phase, state: SubmissionState, results: Sequence[Judged])
     enough = len(phase.numbers) >= phase.model.least_trials
     if state.state == "done" and enough and not missing(results, phase):
         told["summary"] = summary(phase, results, phase.model.digits)
-    ordered = sorted(results, key=lambda own: own.number)
-    at_fault = [own for own in ordered if own.owner == "submission"]
-    told["faults"] = sorted({own.end for own in at_fault})
+    ordered = sorted(results, key=lambda result: result.number)
+    at_fault = [result for result in ordered if result.owner == "submission"]
+    told["faults"] = sorted({result.end for result in at_fault})
     shown = (at_fault or ordered[-1:])[:1]
     told["log"] = tail(shown[0].log, phase.model.log_lines) if shown else ""
     return told
@@ -126,7 +126,7 @@ def _aggregates(phase: Phase, state: SubmissionState, results: Sequence[Judged])
 
 def summary(phase: Phase, results: Sequence[Judged], digits: int | None = None) -> dict[str, Any] | None:
     """Return how many trials count, and means over them, rounded to `digits`; None if none counts."""
-    rows = [own.row for own in results if own.counts]
+    rows = [result.row for result in results if result.counts]
     if not rows:
         return None
     metric = phase.ranking.metric
@@ -136,5 +136,5 @@ def summary(phase: Phase, results: Sequence[Judged], digits: int | None = None) 
         "satisfied": sum(map(is_satisfied, rows)) / len(rows),
         "clean": sum(map(is_clean, rows)) / max(1, len(rows) - sum(map(is_cut, rows))),
     }
-    told = {name: own if digits is None else round(own, digits) for name, own in found.items()}
+    told = {name: number if digits is None else round(number, digits) for name, number in found.items()}
     return {"trials": len(rows), **told}

@@ -133,13 +133,13 @@ class Crew:
     """
 
     def __init__(self, instances: Sequence[Instance], cast: Cast, settings: Settings) -> None:
-        own = [with_learners(instance, cast.learned) for instance in instances]
+        with_roles = [with_learners(instance, cast.learned) for instance in instances]
         if cast.ego is None:
-            self.group = Group(own, keeps_rules=False)
+            self.group = Group(with_roles, keeps_rules=False)
         else:
             egos = Egos(cast.ego, apart=True)
             is_kernel = egos.is_compiled and not settings.disturbed
-            self.group = egos.group(own, Way.COMPILED if is_kernel else Way.ASKED)
+            self.group = egos.group(with_roles, Way.COMPILED if is_kernel else Way.ASKED)
         self._cars = len(instances[0].starts)
         trials, places = self.group.state.x.shape
         problems = [instance.problem for instance in instances]
@@ -170,7 +170,7 @@ class Crew:
         found: list[CarShields] = []
         for overtakes in dict.fromkeys(cast.shields.values()):
             cars: Bools = np.zeros(self.group.state.x.shape, dtype=np.bool_)
-            cars[:, [car for car, own in cast.shields.items() if own == overtakes]] = True
+            cars[:, [car for car, shield in cast.shields.items() if shield == overtakes]] = True
             found.append(CarShields(problems, self._views, cars, overtakes=overtakes))
         return found
 
@@ -250,9 +250,9 @@ def with_learners(instance: Instance, learned: Sequence[int]) -> Instance:
 
 def _guilty(breach: Breach, contacts: Sequence[Contact]) -> int:
     """Return the number of contacts in the tick of a collision in which the ego is at fault."""
-    own = [one for one in contacts if one.tick == breach.tick]
+    at_tick = [one for one in contacts if one.tick == breach.tick]
     return sum(
         guilty and car == EGO
-        for one in own
+        for one in at_tick
         for car, guilty in zip((one.car, one.other), one.at_fault, strict=True)
     )

@@ -88,8 +88,8 @@ class Episodes:
             groups.setdefault((seed, self._level_of(seed, trial)), []).append(place)
         found: dict[int, Instance] = {}
         for (seed, level), places in groups.items():
-            own = self.configuration if level < 0 else self._level(level)
-            drawn = draw_many(own, seed, [numbered[place][1] for place in places])
+            configuration = self.configuration if level < 0 else self._level(level)
+            drawn = draw_many(configuration, seed, [numbered[place][1] for place in places])
             found.update(zip(places, drawn, strict=True))
         return [found[place] for place in range(len(numbered))]
 
@@ -131,4 +131,4 @@ def seeds_of(seed: int | Sequence[int | None], envs: int) -> list[tuple[int, int
         raise InputError(
             "not one seed for each environment", field="seed", value=len(seed), expected=str(envs)
         )
-    return [(int(cast(int, own)), 0) for own in seed]
+    return [(int(cast(int, each)), 0) for each in seed]

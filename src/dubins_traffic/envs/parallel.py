@@ -217,7 +217,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         """The commands of all cars in each tick of this episode so far, (K, N, 2), m/s and rad/s."""
         given = self._begun().given
         cars = len(self._cars)  # the tables of a batch may have more places than the trial has cars
-        return np.array([own[0, :cars] for own in given]).reshape(len(given), cars, 2)
+        return np.array([of_cars[0, :cars] for of_cars in given]).reshape(len(given), cars, 2)
 
     def _paid(self, crew: Crew, name: str) -> tuple[float, dict[str, Any]]:
         car = self._ids.index(name)

@@ -98,8 +98,8 @@ class Renderer:
 
 def _visited(outlook: OutlookTables, row: int) -> list[int]:
     """Return the intersections of the goals that the ego of a trial, by its row, has visited in this round."""
-    own = outlook.trial[row]
-    rows = range(own.first_goal, own.last_goal)
+    car = outlook.trial[row]
+    rows = range(car.first_goal, car.last_goal)
     return [outlook.goal[k].vertex for k in rows if outlook.done[k]]
 
 

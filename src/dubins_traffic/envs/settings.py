@@ -139,14 +139,14 @@ class Settings:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < low:
                 raise _wrong(name, value, f"an integer >= {low}")
-        own = self.config if isinstance(self.config, Configuration) else load_config(self.config)
-        episodes = Episodes(own, Levels.of(self.levels))
+        configuration = self.config if isinstance(self.config, Configuration) else load_config(self.config)
+        episodes = Episodes(configuration, Levels.of(self.levels))
         (sample,) = episodes.draw([(0, 0, 0)])
         require_dubins(sample.problem.car, "environments move cars together, which is")
         if not can_share(sample):
             expected = "the embedded simulator, no formulas, no remote cars"
             raise InputError(
-                "can't be an environment", file=own.file, value=sample.simulator, expected=expected
+                "can't be an environment", file=configuration.file, value=sample.simulator, expected=expected
             )
         if self.formulas:
             with_formulas(sample, self.formulas)

@@ -86,8 +86,8 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         """
         super().reset(seed=seed)
         if seed is not None or not self._seeded:
-            own = int(self.np_random.integers(2**63)) if seed is None else seed
-            self.fleet.seed(0, (own, 0), (options or {}).get("episode", 0))
+            base_seed = int(self.np_random.integers(2**63)) if seed is None else seed
+            self.fleet.seed(0, (base_seed, 0), (options or {}).get("episode", 0))
             self._seeded = True
         self.fleet.begin([0])
         self._interventions = 0 if self._is_shielded else None

@@ -69,14 +69,14 @@ def weights_of(given: Mapping[str, float] | None) -> Floats:
 
 def _weighted(usual: Mapping[str, float], given: Mapping[str, float], field: str) -> dict[str, float]:
     """Return the weights by term, in the order of `usual`; `field` names what is given."""
-    own = dict(usual)
+    weights = dict(usual)
     for name, value in given.items():
-        if name not in own:
+        if name not in weights:
             raise InputError("no such term", field=field, value=name, expected=", ".join(usual))
         if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError("not a weight", field=f"{field}.{name}", value=value, expected="a finite number")
-        own[name] = float(value)
-    return own
+        weights[name] = float(value)
+    return weights
 
 
 ADVERSARY: Final[Mapping[str, float]] = {
@@ -138,8 +138,8 @@ class Pay:
         """
         if car == EGO:
             costly: Floats = broken[EGO, :_FIRST].astype(np.float64)
-            own = np.concatenate([terms[EGO, : TERM.BREACHES], costly])
-            weighted: list[float] = (own * self._ego).tolist()
+            of_ego = np.concatenate([terms[EGO, : TERM.BREACHES], costly])
+            weighted: list[float] = (of_ego * self._ego).tolist()
             costs = dict(zip(COSTS, costly.tolist(), strict=True))
             return sum(weighted), {"reward_terms": dict(zip(TERMS, weighted, strict=True)), "cost": costs}
         parts = dict(zip(ASSUMPTIONS, map(float, broken[car, _FIRST:]), strict=True))

@@ -186,7 +186,9 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         if not self.settings.formulas:
             return {}
         each = [self.fleet.states(env) for env in range(self.num_envs)]
-        return {"formulas": {name: np.array([own[name] for own in each]) for name in self.settings.formulas}}
+        return {
+            "formulas": {name: np.array([states[name] for states in each]) for name in self.settings.formulas}
+        }
 
     def _ended(self, some: Sequence[int]) -> dict[str, Any]:
         """Return the infos of episodes that have ended."""
@@ -200,9 +202,9 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
     ) -> dict[str, Any]:
         """Return the last observations and infos of episodes that have ended in this step."""
         flat = self.fleet.board.arrays["flat"]
-        own, layout = self.settings.observation, self.settings.layout
+        kind, layout = self.settings.observation, self.settings.layout
         final = {**told, "_reward_terms": over.copy(), "_cost": over.copy(), **last}
-        observations = self._spread(ended, "final_obs", [observed(own, layout, flat[env]) for env in ended])
+        observations = self._spread(ended, "final_obs", [observed(kind, layout, flat[env]) for env in ended])
         return {**observations, "final_info": final, "_final_info": over.copy()}
 
     def _spread(self, some: Sequence[int], name: str, values: Sequence[Any]) -> dict[str, Any]:

@@ -81,7 +81,7 @@ class Case:
         document = instance_to_document(replace(self.instance, extra={**extra, KEY: asdict(self.story)}))
         return (
             "{\n"
-            + ",\n".join(f" {json.dumps(key)}: {json.dumps(own)}" for key, own in document.items())
+            + ",\n".join(f" {json.dumps(key)}: {json.dumps(entry)}" for key, entry in document.items())
             + "\n}\n"
         )
 
@@ -162,7 +162,7 @@ def sentence_of(record: Record, score: Score, breach: Violation) -> str:
 
 
 def _collision(record: Record, score: Score, breach: Violation) -> str:
-    hits = [own for own in score.collisions if abs(own.time - breach.time) <= 1.5 / record.frames.rate]
+    hits = [hit for hit in score.collisions if abs(hit.time - breach.time) <= 1.5 / record.frames.rate]
     other = hits[0].partner if hits else "something"
     place = f"at {_crossing(breach)}" if breach.where.intersection else f"on {_road(breach)}"
     speed = float(record.frames.speed[max(0, breach.tick - 1), EGO])
@@ -205,8 +205,12 @@ def _crossing(breach: Violation) -> str:
 
 
 def _road(breach: Violation) -> str:
-    own = breach.where.segment
-    return "its road" if own is None else f"the road from ({own[0]}, {own[1]}) to ({own[2]}, {own[3]})"
+    segment = breach.where.segment
+    return (
+        "its road"
+        if segment is None
+        else f"the road from ({segment[0]}, {segment[1]}) to ({segment[2]}, {segment[3]})"
+    )
 
 
 Make = Callable[[], "Controller"] | Remote
@@ -243,8 +247,8 @@ class Judged:
         if rule in contract.CONTRACT:
             ticks = [tick for cell, tick in self.tried.cells if cell.rule == rule]
             return contract.breach_of(rule, ticks[0], verdict, self.record) if verdict and ticks else None
-        own = () if verdict is None else verdict.violations
-        for broken in own:
+        violations = () if verdict is None else verdict.violations
+        for broken in violations:
             if broken.car == EGO_NAME and broken.rule == rule:
                 return broken
         time = broken_formulas(self.score).get(rule)
@@ -334,12 +338,14 @@ def write_page(
     name = name_of(driver)
     judged = judge(case.instance, driver_of(driver), name)
     record, verdict = judged.record, judged.score.verdict
-    own = [] if verdict is None else [broken.rule for broken in verdict.violations if broken.car == EGO_NAME]
+    rules = (
+        [] if verdict is None else [broken.rule for broken in verdict.violations if broken.car == EGO_NAME]
+    )
     summary = {
         "rule": case.story.rule,
         "what happens": case.story.sentence,
         "controller": name,
-        "broken by the ego": ", ".join(dict.fromkeys(own)) or "nothing",
+        "broken by the ego": ", ".join(dict.fromkeys(rules)) or "nothing",
     }
     write_replay(
         path, record.instance, record.frames, record.ending, summary, (), verdict, overwrite=overwrite

@@ -89,11 +89,11 @@ def kept(verdict: Verdict, passages: Passages, trial: int, instance: Instance) -
 def provocation(verdict: Verdict, instance: Instance) -> Violation | None:
     """Return the breach of a car that keeps the law, if it is among the first of all and the ego's is not."""
     first = verdict.violations[0].tick if verdict.violations else -1
-    at_first = [own for own in verdict.violations if own.tick == first]
+    at_first = [violation for violation in verdict.violations if violation.tick == first]
     lawful = {agent.name for agent in instance.e_agents if keeps_law(agent)}
-    if any(own.car == EGO_NAME for own in at_first):
+    if any(violation.car == EGO_NAME for violation in at_first):
         return None
-    return next((own for own in at_first if own.car in lawful), None)
+    return next((violation for violation in at_first if violation.car in lawful), None)
 
 
 def _longest_wait(
@@ -107,7 +107,7 @@ def _longest_wait(
     if limit is None or instance.duration <= limit:
         return None
     allowed = _ticks(limit, rate)
-    last = min([max(own.tick - 1, 0) for own in verdict.violations], default=passages.last(trial))
+    last = min([max(violation.tick - 1, 0) for violation in verdict.violations], default=passages.last(trial))
     visits = passages.visits(trial, frozenset(instance.problem.goal_vertices))
     marks = [0, *(tick for tick in visits if 0 < tick <= last), last]
     gaps = np.diff(marks)
@@ -154,7 +154,7 @@ def sentence_of(verdict: Verdict | None, breach: Violation) -> str:
 
 def check_lawful(instances: Sequence[Instance]) -> None:
     """Refuse trials in which no e-agent keeps the law."""
-    if not any(keeps_law(agent) for own in instances for agent in own.e_agents):
+    if not any(keeps_law(agent) for instance in instances for agent in instance.e_agents):
         raise InputError(
             "has no e-agents that keep the law", file="--rule", value=PROVOKED,
             expected="e-agents of the kind lawful or nemesis",
@@ -208,11 +208,11 @@ def first_overdue(record: Record, limit: float) -> Overdue | None:
 
 def check_long_enough(instances: Sequence[Instance], target: str) -> None:
     """Refuse trials none of which lasts as long as a gap may; `target` is what is asked for."""
-    limits = [limit_of(own.problem) for own in instances]
+    limits = [limit_of(instance.problem) for instance in instances]
     least = min([limit for limit in limits if limit is not None], default=None)
     if least is None:
         raise InputError("has no goals that can be visited", file="--rule", value=target)
-    longest = max(own.duration for own in instances)
+    longest = max(instance.duration for instance in instances)
     if longest <= least:
         raise InputError(
             "no gap between visits can be over its limit in trials so short", file="--duration", value=longest,

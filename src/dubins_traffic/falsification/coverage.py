@@ -137,10 +137,12 @@ def possible(instances: Iterable[Instance]) -> list[Cell]:
             through = THROUGH if degree > 2 else ()
             for rule in EGO_RULES:
                 if rule.startswith("3."):
-                    found |= {Cell(rule, own, degree) for own in through if degree >= least}
+                    found |= {Cell(rule, manoeuvre, degree) for manoeuvre in through if degree >= least}
                 else:
                     at_discs = through if rule.startswith("1.") else ()
-                    found |= {Cell(rule, own, degree) for own in (*ALONG.get(rule, ()), *at_discs)}
+                    found |= {
+                        Cell(rule, manoeuvre, degree) for manoeuvre in (*ALONG.get(rule, ()), *at_discs)
+                    }
     return sorted(found, key=lambda cell: cell.number)
 
 

@@ -230,7 +230,7 @@ def estimate(
         Without the extra `falsify`, which brings SciPy.
     """
     distributions("an estimate of a probability", "falsify")
-    own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
+    config = configuration if isinstance(configuration, Configuration) else load_config(configuration)
     if event not in TARGETS:
         expected = f"one of {', '.join(TARGETS)}"
         raise InputError("no rule of the ego's", file="--event", value=event, expected=expected)
@@ -240,15 +240,15 @@ def estimate(
         )
     if not math.isfinite(below):
         raise InputError("not a margin", file="--below", value=below, expected="a finite number")
-    own = prepared(own, duration, {})
+    config = prepared(config, duration, {})
     name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
     told = progress or _silent
     if method == "splitting":
         begin = beginner(controller, event)
-        return by_splitting(drawn(own, seed), begin, event, below, particles, runs, seed, told)
+        return by_splitting(drawn(config, seed), begin, event, below, particles, runs, seed, told)
     count = trials or 10_000
     with crew_of(controller, name, workers, None) as crew:
-        return by_counting(draw_many(own, seed, range(count)), crew, event, below, told)
+        return by_counting(draw_many(config, seed, range(count)), crew, event, below, told)
 
 
 def by_counting(
@@ -302,10 +302,10 @@ def by_splitting(
         some = range(first, min(first + most, runs))
         dice = [np.random.default_rng([STREAM, seed, run, 1]) for run in some]
         instances = draw(range(some.start * particles, some.stop * particles))
-        before = sum(own.trials for own in splits)
+        before = sum(done.trials for done in splits)
         splits += split(instances, begin, below, dice, lambda done, before=before: progress(before + done))
     found = combined(splits, particles)
-    each = tuple(own.probability for own in splits)
+    each = tuple(done.probability for done in splits)
     return Probability(
         "splitting", words(event, below), found.probability, found.interval, None, found.trials, None, None, each,
         replicas=found,
@@ -317,8 +317,8 @@ def drawn(configuration: Configuration, seed: int) -> Callable[[range], list[Ins
 
     def draw(numbers: range) -> list[Instance]:
         found = list(draw_many(configuration, seed, numbers))
-        longest = max(own.duration for own in found)
-        return [own if own.duration == longest else replace(own, duration=longest) for own in found]
+        longest = max(instance.duration for instance in found)
+        return [one if one.duration == longest else replace(one, duration=longest) for one in found]
 
     return draw
 

@@ -115,9 +115,9 @@ def starts_of(genome: Genome, base: Instance) -> list[Pose]:
 def started(genome: Genome, base: Instance, starts: list[Pose], moved: Mapping[int, Pose]) -> Genome:
     """Return a genome with other starts; the same if one that is moved would be too near to another car."""
     apart = gap_radius(base.problem.car)
-    for car, own in moved.items():
+    for car, start in moved.items():
         for n, pose in enumerate(starts):
-            if n != car and hypot(pose.x - own.x, pose.y - own.y) < apart:
+            if n != car and hypot(pose.x - start.x, pose.y - start.y) < apart:
                 return genome
     return Genome(genome.base, genome.root, {**genome.starts, **moved}, genome.tables, genome.whims)
 
@@ -129,8 +129,8 @@ def span_of(base: Instance, pose: Pose) -> tuple[float, float] | None:
     if spot is None:
         return None
     k, along = spot
-    own = lots.places[k]
-    return min(own.low - along, 0.0), max(own.high - along, 0.0)
+    lot = lots.places[k]
+    return min(lot.low - along, 0.0), max(lot.high - along, 0.0)
 
 
 def spot_of(lots: Lots, pose: Pose) -> tuple[int, float] | None:
@@ -168,9 +168,9 @@ def lots_of(base: Instance) -> Lots:
         ]
         first: dict[int, int] = {}
         last: dict[int, int] = {}
-        for k, own in enumerate(places):
-            first.setdefault(own.lane, k)
-            last[own.lane] = k
+        for k, lot in enumerate(places):
+            first.setdefault(lot.lane, k)
+            last[lot.lane] = k
         ends = {lane: problem.network.lane_ends(lane) for lane in first}
         found = problem.network.known[key] = Lots(places, _near(places), first, last, ends)
     return found  # pyright: ignore[reportReturnType]  # what stands under our own key
@@ -247,8 +247,8 @@ def _place(
     spot = spot_of(lots, genome.starts.get(EGO, base.starts[EGO]))
     if spot is None:
         return None
-    (places, _, first, last, ends), (own, along) = lots, spot
-    lane = places[own].lane
+    (places, _, first, last, ends), (lot, along) = lots, spot
+    lane = places[lot].lane
     vertex = ends[lane][1]
     if kind < LEAVES:
         end = 1 if kind < COMES else 0
@@ -257,10 +257,10 @@ def _place(
             return None
         arm = arms[int(dice.integers(len(arms)))]
         if kind < COMES:
-            return last[arm], places[last[arm]].high - places[own].high + along + near
+            return last[arm], places[last[arm]].high - places[lot].high + along + near
         return first[arm], places[first[arm]].low + abs(near)
     if kind < LEADS:
-        return own, along + gap_radius(base.problem.car) + abs(near)
+        return lot, along + gap_radius(base.problem.car) + abs(near)
     beside = last.get(lane ^ 1)
     if beside is None:
         return None

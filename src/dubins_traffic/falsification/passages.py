@@ -122,8 +122,10 @@ class Passages:
             "3.clear": entered & _held(came, BARRED),
         }
         within = self.manoeuvre * DEGREES + self.degree
-        numbers = [EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[own] for rule, own in tested.items()]
-        places = [self.trial[own] for own in tested.values()]
+        numbers = [
+            EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[rows] for rule, rows in tested.items()
+        ]
+        places = [self.trial[rows] for rows in tested.values()]
         number, trial = np.concatenate(numbers), np.concatenate(places)
         order = np.lexsort((number, trial))
         ends: list[int] = np.searchsorted(trial[order], np.arange(trials + 1)).tolist()
@@ -161,9 +163,9 @@ def find_passages(
     kept = whole.ravel()[place] != OVER
     place, held, ends = place[kept], held[kept], ends[kept]
     trial, first = place // width, place % width
-    own = whole.ravel()[place]
+    lane_of_stretch = whole.ravel()[place]
     ground = _ground(networks)
-    manoeuvre, degree = _manoeuvres(trial, own, held, ground)
+    manoeuvre, degree = _manoeuvres(trial, lane_of_stretch, held, ground)
     fresh = np.append(True, trial[1:] != trial[:-1])
     return Passages(
         trial,
@@ -171,8 +173,8 @@ def find_passages(
         ends - trial * width,
         manoeuvre,
         degree,
-        own < 0,
-        _discs(trial, own, ground),
+        lane_of_stretch < 0,
+        _discs(trial, lane_of_stretch, ground),
         held,
         np.where(fresh, 0, np.roll(held, 1)),
     )
@@ -198,10 +200,10 @@ class _Ground:
 def _ground(networks: Sequence[RoadNetwork]) -> _Ground:
     distinct = {id(network): network for network in networks}
     tables = [_lanes(network) for network in distinct.values()]
-    sizes = np.cumsum([0, *(len(own[0]) for own in tables)])
+    sizes = np.cumsum([0, *(len(table[0]) for table in tables)])
     base = dict(zip(distinct, sizes.tolist(), strict=False))
     place = np.array([base[id(network)] for network in networks])
-    head, tail, into, out_of, tangent = [np.concatenate(own) for own in zip(*tables, strict=True)]
+    head, tail, into, out_of, tangent = [np.concatenate(arrays) for arrays in zip(*tables, strict=True)]
     return _Ground(head, tail, into, out_of, tangent, place)
 
 
@@ -247,7 +249,7 @@ def _manoeuvres(trial: Ints, lane: Ints, flags: Ints, ground: _Ground) -> tuple[
     """Return manoeuvre and degree of each stretch."""
     came, goes = _neighbours(trial, lane)
     base = ground.base[trial]
-    before, after, own = (np.where(which < 0, 0, which) + base for which in (came, goes, lane))
+    before, after, present = (np.where(which < 0, 0, which) + base for which in (came, goes, lane))
     t0, t1 = ground.tangent[before], ground.tangent[after]
     sine = t0[:, 0] * t1[:, 1] - t0[:, 1] * t1[:, 0]
     ahead = t0[:, 0] * t1[:, 0] + t0[:, 1] * t1[:, 1] > 0.0
@@ -262,6 +264,8 @@ def _manoeuvres(trial: Ints, lane: Ints, flags: Ints, ground: _Ground) -> tuple[
         Manoeuvre.DRIVING,
     )
     in_disc = lane < 0
-    degree = np.where(in_disc, np.where(came >= 0, ground.head[before], ground.tail[after]), ground.head[own])
+    degree = np.where(
+        in_disc, np.where(came >= 0, ground.head[before], ground.tail[after]), ground.head[present]
+    )
     unknown = in_disc & (came < 0) & (goes < 0)
     return np.where(in_disc, through, along), np.where(unknown, 0, degree)

@@ -98,16 +98,16 @@ def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remot
         verdict, ending = judged.score.verdict, judged.record.ending
         if verdict is None:
             raise InputError("is not judged by the rules", file=str(path), field="rules", expected="true")
-        own = [broken for broken in verdict.violations if broken.car == EGO_NAME]
-        own = own if verdict.verdict is Ruling.VIOLATED else []
+        breaches = [broken for broken in verdict.violations if broken.car == EGO_NAME]
+        breaches = breaches if verdict.verdict is Ruling.VIOLATED else []
         if case.story.rule not in EGO_RULES and (asked := judged.breach(case.story.rule)) is not None:
-            own = [*own, asked]
+            breaches = [*breaches, asked]
         fault = ending if ending is not None and ending.end in FAULTS else None
         said = verdict.verdict.value if fault is None else fault.end.value
-        of_it = [broken for broken in own if broken.rule == case.story.rule] or own
-        told = sentence_of(judged.record, judged.score, of_it[0]) if own else ""
-        yield Outcome(path, case, said, _rules(own), told, "" if fault is None else str(fault))
+        of_it = [broken for broken in breaches if broken.rule == case.story.rule] or breaches
+        told = sentence_of(judged.record, judged.score, of_it[0]) if breaches else ""
+        yield Outcome(path, case, said, _rules(breaches), told, "" if fault is None else str(fault))
 
 
-def _rules(own: Sequence[Violation]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(broken.rule for broken in own))
+def _rules(breaches: Sequence[Violation]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(broken.rule for broken in breaches))

@@ -90,7 +90,7 @@ class Particle:
 
     def branched(self, checkpoint: int, seed: int) -> Particle:
         """Return the particle that goes on from another seed at a checkpoint."""
-        before = [own for own in self.seeds if own[0] < checkpoint]
+        before = [drawn for drawn in self.seeds if drawn[0] < checkpoint]
         return Particle(self.first, (*before, (checkpoint, seed)))
 
     def seed_at(self, checkpoint: int) -> int:
@@ -209,14 +209,14 @@ def split(
     progress : callable
         Is told how many trials have run.
     """
-    company, ticks, seeds = begin(instances), instances[0].ticks, [own.seed for own in instances]
+    company, ticks, seeds = begin(instances), instances[0].ticks, [instance.seed for instance in instances]
     every, each = max(1, ticks // CHECKPOINTS), len(instances) // len(dice)
     first = [Particle(k, ((0, seed),)) for k, seed in enumerate(seeds)]
     paths = follow(first, company, seeds, every, ticks)
     runs: list[Run] = []
-    for k, own in enumerate(dice):
+    for k, generator in enumerate(dice):
         mine = slice(k * each, (k + 1) * each)
-        runs.append(Run(first[mine], Paths(paths.scores[mine], paths.margins[mine]), below, own))
+        runs.append(Run(first[mine], Paths(paths.scores[mine], paths.margins[mine]), below, generator))
     done = len(first)
     going = [(run, found) for run in runs if (found := run.children())]
     while going:
@@ -240,12 +240,12 @@ def follow(
 
     Checkpoint 0 is the first frame, and there is one every `every` ticks, the last at the end.
     """
-    running = company.fork([own.first for own in particles])
+    running = company.fork([particle.first for particle in particles])
     found = [running.levels()]
-    present = [seeds[own.first] for own in particles]
+    present = [seeds[particle.first] for particle in particles]
     done = checkpoint = 0
     while done < ticks:
-        wanted = [own.seed_at(checkpoint) for own in particles]
+        wanted = [particle.seed_at(checkpoint) for particle in particles]
         if wanted != present:
             running.reseed(wanted)
             present = wanted
@@ -322,7 +322,9 @@ def coming(group: Group) -> Floats:
     """
     state, reach = group.state, group.world.cars.reach
     x, y = (array[:, 1:] - array[:, :1] for array in (state.x, state.y))
-    vx, vy = (own[:, 1:] - own[:, :1] for own in (state.speed * state.c, state.speed * state.s))
+    vx, vy = (
+        velocity[:, 1:] - velocity[:, :1] for velocity in (state.speed * state.c, state.speed * state.s)
+    )
     places: int = state.x.shape[1]
     absent = np.arange(1, places) >= state.count[:, None]
     least = np.full(len(x), np.inf)

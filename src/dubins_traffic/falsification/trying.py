@@ -89,8 +89,8 @@ class Tried:
             for rule, manoeuvre, degree, tick in document["cells"]
         )
         numbers = {name: tuple(document[name]) for name in ("situations", "exercised")}
-        own: dict[str, Any] = {**document, "cells": cells, **numbers}
-        return Tried(**own)
+        values: dict[str, Any] = {**document, "cells": cells, **numbers}
+        return Tried(**values)
 
 
 class TrialRunner:
@@ -126,34 +126,34 @@ class TrialRunner:
         What runs without asking anybody in Python runs together, and so does what one controller drives; else no more
         trials than `fitting` says. KeyboardInterrupt when it is cancelled.
         """
-        places = {id(own): k for k, own in enumerate(instances)}
+        places = {id(instance): k for k, instance in enumerate(instances)}
         ways = {Way.ALONE: list(instances)} if self._remote is not None else self._egos.ways(instances)
-        for own in grouped(ways.get(Way.COMPILED, ())):
+        for alike in grouped(ways.get(Way.COMPILED, ())):
             self.answer_s = 0.0
-            yield self._together(own, Way.COMPILED, places)
-        for own in grouped(ways.get(Way.ASKED, ())):
+            yield self._together(alike, Way.COMPILED, places)
+        for alike in grouped(ways.get(Way.ASKED, ())):
             first = 0
-            while first < len(own):
-                some = own[first : first + self._count(own[first:])]
+            while first < len(alike):
+                some = alike[first : first + self._count(alike[first:])]
                 yield self._together(some, Way.ASKED, places)
                 first += len(some)
-        for own in ways[Way.ALONE]:
+        for instance in ways[Way.ALONE]:
             self._check()
-            yield {places[id(own)]: self._alone(own)}
+            yield {places[id(instance)]: self._alone(instance)}
 
     def _count(self, instances: Sequence[Instance]) -> int:
         """Return how many of some trials whose controllers are asked in every tick run together."""
         most = min(self._most, len(instances))
         if self._is_shared:
             return most
-        return fitting(self.answer_s, max(own.ticks for own in instances), most)
+        return fitting(self.answer_s, max(instance.ticks for instance in instances), most)
 
     def _note(self, summaries: Iterable[Mapping[str, float]]) -> None:
         """Note how long the controller took for an answer in trials, by the summaries of their latencies.
 
         Trials in which it was never asked, since its start failed, tell nothing of that.
         """
-        means = [own["mean"] for own in summaries if own]
+        means = [summary["mean"] for summary in summaries if summary]
         if means:
             self.answer_s = sum(means) / len(means)
 
@@ -174,11 +174,14 @@ class TrialRunner:
         outcomes = group.fresh(self._egos.name)
         self._note(outcome.act_s for outcome in outcomes)
         frames = np.array([outcome.ending.ticks + 1 for outcome in outcomes])
-        networks = [own.problem.network for own in group.instances]
+        networks = [instance.problem.network for instance in group.instances]
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
-        tried = [tried_of(own.score, own.ending, passages, b, own.instance) for b, own in enumerate(outcomes)]
+        tried = [
+            tried_of(outcome.score, outcome.ending, passages, b, outcome.instance)
+            for b, outcome in enumerate(outcomes)
+        ]
         whole = with_passages(tried, passages, group.instances[0])
-        return {places[id(own.instance)]: came for own, came in zip(outcomes, whole, strict=True)}
+        return {places[id(outcome.instance)]: came for outcome, came in zip(outcomes, whole, strict=True)}
 
     def _alone(self, instance: Instance) -> Tried:
         """Run a trial that can't be stepped with others."""
@@ -229,7 +232,9 @@ def tried_of(
     verdict = score.verdict
     fault = str(ending) if ending is not None and ending.end in FAULTS else ""
     margins = {
-        f"{FORMULA} {own.name}": own.robustness for own in score.formulas if own.robustness is not None
+        f"{FORMULA} {formula.name}": formula.robustness
+        for formula in score.formulas
+        if formula.robustness is not None
     }
     margins[DONE] = score.counted_rounds + score.goals_visited + METRE * score.driven.distance_m
     if verdict is None:
@@ -237,8 +242,10 @@ def tried_of(
     margins |= {rule: value for rule, value in verdict.robustness.items() if value is not None}
     late = spare(instance.problem, verdict, ending)
     margins |= {} if late is None else {LIVENESS: late}
-    own = [broken for broken in verdict.violations if broken.car == EGO_NAME and broken.rule in EGO_RULES]
-    first = {broken.rule: broken.tick for broken in reversed(own)}
+    breaches = [
+        broken for broken in verdict.violations if broken.car == EGO_NAME and broken.rule in EGO_RULES
+    ]
+    first = {broken.rule: broken.tick for broken in reversed(breaches)}
     for rule in first:
         margins[rule] = min(margins.get(rule, -0.0), BROKEN)
     assumption_broken = verdict.assumption_broken
@@ -246,7 +253,7 @@ def tried_of(
         rate = instance.problem.rate
         first |= {rule: round(time * rate) for rule, time in broken_formulas(score).items()}
         first |= {LIVENESS: ending.ticks} if ending is not None and late is not None and late < 0.0 else {}
-    discarded = verdict.verdict is Ruling.EXCUSED or (not own and assumption_broken)
+    discarded = verdict.verdict is Ruling.EXCUSED or (not breaches and assumption_broken)
     contract = Kept() if fault else kept(verdict, passages, trial, instance)
     margins |= contract.margins
     first = contract.frames if discarded else first | contract.frames
@@ -269,21 +276,21 @@ def with_passages(tried: Sequence[Tried], passages: Passages, instance: Instance
     degree = RuleParameters.from_mapping(instance.problem.rules).crossing_degree
     met, tested = passages.situations(len(tried)), passages.exercised(len(tried), degree)
     return [
-        replace(own, situations=met[b], exercised=() if own.faulty else tested[b])
-        for b, own in enumerate(tried)
+        replace(each, situations=met[b], exercised=() if each.faulty else tested[b])
+        for b, each in enumerate(tried)
     ]
 
 
 def in_order(parts: Iterable[Mapping[int, Tried]]) -> list[Tried]:
     """Return what came of trials in the order of their instances, of which `parts` have some each."""
-    found = {k: own for part in parts for k, own in part.items()}
+    found = {k: each for part in parts for k, each in part.items()}
     return [found[k] for k in range(len(found))]
 
 
 def broken_formulas(score: Score) -> dict[str, float]:
     """Return the seconds at which the problem's own formulas became false, by what a search calls them."""
-    false = [own for own in score.formulas if own.verdict == "false"]
-    return {f"{FORMULA} {own.name}": own.time for own in false if own.time is not None}
+    false = [formula for formula in score.formulas if formula.verdict == "false"]
+    return {f"{FORMULA} {formula.name}": formula.time for formula in false if formula.time is not None}
 
 
 MOST_IN_CHUNK: Final = 32
@@ -365,7 +372,7 @@ class PoolRunner:
         first = 0
         while first < len(instances):
             rest = instances[first : first + MOST_IN_CHUNK]
-            some = rest[: fitting(self._answer_s, max(own.ticks for own in rest), len(rest))]
+            some = rest[: fitting(self._answer_s, max(instance.ticks for instance in rest), len(rest))]
             yield TrialChunk(self._number, self.name, first, tuple(some))
             self._number += 1
             first += len(some)

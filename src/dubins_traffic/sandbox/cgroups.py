@@ -138,10 +138,12 @@ def _first_version() -> Trees:
 
 def _second_version() -> Trees:
     root = Path("/sys/fs/cgroup")
-    own = next((line.split(":", 2)[2] for line in _lines("/proc/self/cgroup") if line.startswith("0:")), None)
-    if own is None or not (root / "cgroup.controllers").is_file():
+    path = next(
+        (line.split(":", 2)[2] for line in _lines("/proc/self/cgroup") if line.startswith("0:")), None
+    )
+    if path is None or not (root / "cgroup.controllers").is_file():
         return Trees(2)
-    here = root / own.lstrip("/")
+    here = root / path.lstrip("/")
     for folder in (here, here.parent):
         if root not in (folder, *folder.parents) or not _can_make(folder):
             continue

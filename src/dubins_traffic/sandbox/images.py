@@ -116,7 +116,7 @@ class _Podman:
     def __call__(self, *words: str) -> str:
         """Return what podman says; InputError if it says no, OSError if it has no room."""
         home = str(self._folder)
-        own = {
+        environment = {
             "HOME": home,
             "TMPDIR": home,
             "XDG_RUNTIME_DIR": home,
@@ -129,7 +129,7 @@ class _Podman:
                 capture_output=True,
                 timeout=WAIT,
                 check=False,
-                env=own,
+                env=environment,
                 cwd=home,
             )
         except subprocess.TimeoutExpired:

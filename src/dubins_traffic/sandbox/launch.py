@@ -101,7 +101,7 @@ def command_line(
 
 def outside(program: Program, word: str) -> str:
     """Return a word of a command line, or of an environment, as it is where there is no box."""
-    for each in sorted(program.shown, key=lambda own: len(own.place), reverse=True):
+    for each in sorted(program.shown, key=lambda shown: len(shown.place), reverse=True):
         if word.startswith(each.place):
             return each.source + word.removeprefix(each.place)
         if each.place.rpartition("/")[0] == word:

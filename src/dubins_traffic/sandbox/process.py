@@ -100,8 +100,8 @@ def _stat(process: int) -> tuple[float, int] | None:
     parts = data.rpartition(b")")[2].split()
     user, system, gone_user, gone_system = (int(part) for part in parts[11:15])
     exact = _exact(process)
-    own = (user + system) * _TICK if exact is None else exact
-    return own + (gone_user + gone_system) * _TICK, int(parts[21])
+    alive = (user + system) * _TICK if exact is None else exact
+    return alive + (gone_user + gone_system) * _TICK, int(parts[21])
 
 
 def _exact(process: int) -> float | None:
@@ -187,9 +187,9 @@ class Processes:
                 self._group.close()
             raise
         self._streams = [self._process.stdin, self._process.stdout, self._process.stderr]
-        own = [stream.fileno() for stream in self._streams if stream is not None]
-        self.questions, self.answers, self.printed = own if len(own) == 3 else (*own, -1)
-        for each in own:
+        ends = [stream.fileno() for stream in self._streams if stream is not None]
+        self.questions, self.answers, self.printed = ends if len(ends) == 3 else (*ends, -1)
+        for each in ends:
             os.set_blocking(each, False)
         self._forgotten = weakref.finalize(self, _shut, self._process)
         self._others: list[int] = []
@@ -335,11 +335,11 @@ def _groups(layers: Layers) -> cgroups.Trees:
 
 
 def _environment(program: Program, layers: Layers) -> dict[str, str]:
-    own = {"PATH": os.environ.get("PATH", os.defpath)} if ENVIRONMENT in layers else dict(os.environ)
+    base = {"PATH": os.environ.get("PATH", os.defpath)} if ENVIRONMENT in layers else dict(os.environ)
     if layers.boxes:
-        return own
+        return base
     more = {name: outside(program, value) for name, value in program.environment.items()}
-    return own | {"HOME": "/tmp", "LANG": "C.UTF-8", **more}
+    return base | {"HOME": "/tmp", "LANG": "C.UTF-8", **more}
 
 
 @contextlib.contextmanager

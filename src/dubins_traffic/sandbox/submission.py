@@ -155,8 +155,8 @@ def script(inside: str, *words: str) -> Program:
 
 def _python(spec: str, *shown: Shown, paths: tuple[str, ...] = ()) -> Program:
     """Return the program that drives with a controller in Python, by our shim."""
-    _, _, own = interpreter()
-    words = [word for path in (*own, *paths) for word in ("--path", path)]
+    _, _, search_path = interpreter()
+    words = [word for path in (*search_path, *paths) for word in ("--path", path)]
     base = script(SHIM, *words, spec)
     kernels = folders.base_folder()
     environment = {**base.environment, **ONE_THREAD, folders.FOLDER: KERNELS, folders.TIER: folders.KEPT}

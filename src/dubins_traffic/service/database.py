@@ -113,7 +113,7 @@ class Database:
 
 def _check_known(connection: Connection, known: ScriptDirectory) -> None:
     found = MigrationContext.configure(connection).get_current_revision()
-    ours = {own.revision for own in known.walk_revisions()}
+    ours = {script.revision for script in known.walk_revisions()}
     if found is not None and found not in ours:
         raise InputError(
             "a later version of dubins-traffic made these tables",

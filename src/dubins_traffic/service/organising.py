@@ -260,7 +260,7 @@ def _of_phase(
 ) -> Iterator[tuple[str, bytes]]:
     hiding = service.hiding(phase)
     latest = standings.latest_standing(session, phase, hiding)
-    counted = {own.id for own in standings.counting(session, phase).values()}
+    counted = {submission.id for submission in standings.counting(session, phase).values()}
     yield f"{phase.name}/table.json", _json([] if latest is None else latest.places)
     described = [
         {
@@ -273,12 +273,12 @@ def _of_phase(
             "disqualified": one.disqualified,
             "counted": one.id in counted,
         }
-        for one in sorted(found, key=lambda own: own.id)
+        for one in sorted(found, key=lambda submission: submission.id)
     ]
     yield f"{phase.name}/submissions.json", _json(described)
     for one in found:
         trials = submissions.trials(session, one, hiding)
-        rows = [{**viewing.shared(own.row), "frames": own.frames} for own in trials]
+        rows = [{**viewing.shared(trial.row), "frames": trial.frames} for trial in trials]
         yield f"{phase.name}/results-{one.id}.json", _json(rows)
 
 

@@ -144,11 +144,13 @@ def places(session: Session) -> Mapping[int, int]:
     before: Counter[int] = Counter()
     found: dict[int, int] = {}
     for submission_id, team_id, _ in rows:
-        own = before[team_id]
+        ahead = before[team_id]
         before[team_id] += 1
         if submission_id not in found:
             others = sum(
-                min(many[other], own + (turns[other] < turns[team_id])) for other in many if other != team_id
+                min(many[other], ahead + (turns[other] < turns[team_id]))
+                for other in many
+                if other != team_id
             )
-            found[submission_id] = own + others + 1
+            found[submission_id] = ahead + others + 1
     return found

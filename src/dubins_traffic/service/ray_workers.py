@@ -49,9 +49,9 @@ class Carried:
     """An actor: a worker on a node of the cluster."""
 
     def __init__(self, task: Task, number: int) -> None:
-        own = version(PACKAGE)
-        if own != task.version:
-            raise DubinsTrafficError(f"{socket.gethostname()} has {PACKAGE} {own}, not {task.version}")
+        installed = version(PACKAGE)
+        if installed != task.version:
+            raise DubinsTrafficError(f"{socket.gethostname()} has {PACKAGE} {installed}, not {task.version}")
         logs.to_stderr()
         folder = default_folder() if task.folder is None else Path(task.folder)
         name = f"{task.name[:50]} {number}"

@@ -66,8 +66,8 @@ def take_in(
 
     def keep(session: Session) -> tuple[int, bool]:
         row = found_phase(session, slug, name)
-        own = session.get_one(Account, account.id)
-        submission, new = submissions.receive(session, row, service.phase(row).quota, own, upload, at)
+        member = session.get_one(Account, account.id)
+        submission, new = submissions.receive(session, row, service.phase(row).quota, member, upload, at)
         return submission.id, new
 
     return service.database.patiently(keep)
@@ -96,10 +96,10 @@ def name_it(service: Service, account: Account, number: int) -> None:
             raise RefusedError("the phase is closed")
         if submission.state in ("rejected", "cancelled"):
             raise RefusedError(f"it is {submission.state}")
-        own = update(Submission).where(
+        its_team = update(Submission).where(
             Submission.phase_id == submission.phase_id, Submission.team_id == submission.team_id
         )
-        session.execute(own.values(named=False))
+        session.execute(its_team.values(named=False))
         submission.named = True
         submission.phase.version += 1
 

@@ -133,9 +133,9 @@ def _may_repeat(submission: Submission) -> bool:
 def used(session: Session, phase: Phase, team_id: int, at: float) -> tuple[int, int, int]:
     """Return how many submissions of a team count today (from 0:00 UTC), in the phase, and wait or run."""
     day = datetime.fromtimestamp(at, UTC).replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
-    own = select(func.count()).where(Submission.phase_id == phase.id, Submission.team_id == team_id)
-    costs = own.where(Submission.costs)
-    active = own.where(Submission.state.in_(ACTIVE))
+    of_team = select(func.count()).where(Submission.phase_id == phase.id, Submission.team_id == team_id)
+    costs = of_team.where(Submission.costs)
+    active = of_team.where(Submission.state.in_(ACTIVE))
     counted = (
         session.scalar(query) or 0 for query in (costs.where(Submission.received >= day), costs, active)
     )
@@ -274,9 +274,9 @@ def trials(
 
 def _kept(session: Session, submission: Submission, *, logs: bool = False) -> Sequence[Trial]:
     """Return the results of a submission's present run as they are kept."""
-    own = select(Trial).where(Trial.submission_id == submission.id, Trial.run == submission.run)
+    of_run = select(Trial).where(Trial.submission_id == submission.id, Trial.run == submission.run)
     read = undefer(Trial.log) if logs else defer(Trial.log, raiseload=True)
-    return session.scalars(own.order_by(Trial.number).options(read)).all()
+    return session.scalars(of_run.order_by(Trial.number).options(read)).all()
 
 
 def judge_again(session: Session, submission: Submission, numbers: Sequence[int], at: float) -> None:

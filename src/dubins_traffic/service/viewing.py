@@ -135,8 +135,8 @@ def told_submission(
 
 def differing(service: Service, session: Session, submission: Submission) -> list[int]:
     """Return the trials whose frames were others when they were run a second time."""
-    own = submissions.trials(session, submission, service.hiding(submission.phase))
-    return [trial.number for trial in own if trial.again is not None and trial.again != trial.frames]
+    trials = submissions.trials(session, submission, service.hiding(submission.phase))
+    return [trial.number for trial in trials if trial.again is not None and trial.again != trial.frames]
 
 
 def trial_of(service: Service, session: Session, submission: Submission, number: int) -> Trial | None:

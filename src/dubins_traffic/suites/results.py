@@ -123,8 +123,8 @@ def save_trials(suite: Suite, campaign: Campaign, folder: Path) -> Path:
     entries: list[dict[str, Any]] = []
     seconds: dict[str, dict[str, Any]] = {}
     for k, name in enumerate(campaign.controllers):
-        own = [place for place, one in enumerate(found["controller"].to_pylist()) if one == name]
-        picked, times = found.take(own), clock.take(own)
+        places_of_one = [place for place, one in enumerate(found["controller"].to_pylist()) if one == name]
+        picked, times = found.take(places_of_one), clock.take(places_of_one)
         share = [STRATEGY_SHARE] if STRATEGY_SHARE in found.column_names else []
         columns = played({column: picked[column].to_pylist() for column in (*KEPT, *share)})
         file, where = known["controllers"][k]["file"], ran(campaign.places[k])
@@ -290,13 +290,13 @@ def open_sources(places: Sequence[str]) -> list[Source]:
     first = sources[0].found
     for source in sources[1:]:
         for field in ("suite", "hash", "trials"):
-            own, wanted = getattr(source.found, field), getattr(first, field)
-            if own != wanted:
+            there, wanted = getattr(source.found, field), getattr(first, field)
+            if there != wanted:
                 raise InputError(
                     "results of another suite" if field != "trials" else "results of other trials",
                     file=str(source.path),
                     field=field,
-                    value=own,
+                    value=there,
                     expected=f"{wanted}, as in {sources[0].path}",
                 )
     return sources
@@ -319,9 +319,11 @@ def made_by(sources: Sequence[Source]) -> str:
     """Return a sentence on the versions of the code that made results, each with what it made if there are several."""
     made: dict[tuple[str, str], list[str]] = {}
     for source in sources:
-        own = [entry.controller for entry in source.found.entries]
-        own += [entry.solver for entry in source.found.solvers]
-        made.setdefault((source.found.package, source.found.code), []).append(source.name or ", ".join(own))
+        names_of_source = [entry.controller for entry in source.found.entries]
+        names_of_source += [entry.solver for entry in source.found.solvers]
+        made.setdefault((source.found.package, source.found.code), []).append(
+            source.name or ", ".join(names_of_source)
+        )
     versions = [f"dubins-traffic {package} (sources {code[:SHORT]})" for package, code in made]
     if len(made) == 1:
         return f"Made by {versions[0]}."
@@ -330,11 +332,11 @@ def made_by(sources: Sequence[Source]) -> str:
     return f"Made by different versions of the code, in which trials may go differently: {listed}."
 
 
-def entry_name(source: Source, own: str, count: int) -> str:
+def entry_name(source: Source, name: str, count: int) -> str:
     """Return what an entry of a source is called: NAME, with its own name where the file has several."""
     if not source.name:
-        return own
-    return source.name if count == 1 else f"{source.name} {own}"
+        return name
+    return source.name if count == 1 else f"{source.name} {name}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -109,19 +109,22 @@ def run_cases(
         _run(suite, file, instances, specs, found, workers, progress or (lambda _done, _total: None))
         named = {bare_name(spec): found[bare_name(spec)] for spec in specs}
         columns = {
-            name: {column: [own[case][column] for case in instances] for column in COLUMNS}
-            for name, own in named.items()
+            name: {column: [its_rows[case][column] for case in instances] for column in COLUMNS}
+            for name, its_rows in named.items()
         }
         listed = [
             {
                 "controller": name,
                 "file": hash_of_file(spec),
                 "ran": controllers.ran(spec),
-                "columns": played({column: own[column] for column in (*KEPT, STRATEGY_SHARE)}),
+                "columns": played({column: its_columns[column] for column in (*KEPT, STRATEGY_SHARE)}),
             }
-            for (name, own), spec in zip(columns.items(), specs, strict=True)
+            for (name, its_columns), spec in zip(columns.items(), specs, strict=True)
         ]
-        seconds = {name: {column: own[column] for column in rows.WALL} for name, own in columns.items()}
+        seconds = {
+            name: {column: its_columns[column] for column in rows.WALL}
+            for name, its_columns in columns.items()
+        }
         return save(suite, folder, {"entries": listed}, {"entries": seconds})
 
 
@@ -138,13 +141,13 @@ def _run(
     cases = {_key(instance): name for name, instance in instances.items()}
     total = len(specs) * len(instances)
     for spec in specs:
-        own = found.setdefault(bare_name(spec), {})
-        left = [instance for name, instance in instances.items() if name not in own]
+        rows_of_case = found.setdefault(bare_name(spec), {})
+        left = [instance for name, instance in instances.items() if name not in rows_of_case]
         metrics = scores.with_share((), [spec])
         jobs = [Job(one.trial or 0, one.seed or 0, spec, instance=one, metrics=metrics) for one in left]
         for result in run_trials(jobs, workers):
             row = rows.row(0, result.ending, result.score, result.wall.act_s)
-            own[cases[_key(result.instance)]] = {column: row.get(column) for column in COLUMNS}
+            rows_of_case[cases[_key(result.instance)]] = {column: row.get(column) for column in COLUMNS}
             _keep_cases(file, suite, found)
             progress(sum(map(len, found.values())), total)
 
@@ -153,8 +156,8 @@ def faulty(folder: Path, suite: Suite) -> str:
     """Return the notice that cases in a folder ended by a fault; empty if none did."""
     ended = [
         (f"{case} with {name}: {row['end']}: {row['reason'] or ''}".rstrip(": "), row["end"])
-        for name, own in _kept_cases(folder / CASES_FILE, suite).items()
-        for case, row in own.items()
+        for name, its_rows in _kept_cases(folder / CASES_FILE, suite).items()
+        for case, row in its_rows.items()
     ]
     bad = [(told, end) for told, end in ended if end in FAULTS]
     return fault_notice(Counter(end for _, end in bad), len(ended), bad[0][0] if bad else "")
@@ -168,8 +171,8 @@ def _keep_cases(file: Path, suite: Suite, found: Found) -> None:
     lines: list[Mapping[str, Any]] = [{"hash": suite.hash}]
     lines += [
         {"controller": name, "case": case, "row": row}
-        for name, own in found.items()
-        for case, row in own.items()
+        for name, its_rows in found.items()
+        for case, row in its_rows.items()
     ]
     write_text(file, "".join(json.dumps(line) + "\n" for line in lines))
 
@@ -346,8 +349,8 @@ def _kept_games(file: Path, suite: Suite, solver: Solver) -> dict[str, tuple[Gam
     """Return the answers that are kept in a folder; InputError if they are of another suite or solver."""
     try:
         first, *rest = [json.loads(line) for line in read_text(file).splitlines()]
-        own = {"hash": suite.hash, "solver": solver.name, "command": solver.command}
-        if first != own:
+        head = {"hash": suite.hash, "solver": solver.name, "command": solver.command}
+        if first != head:
             raise InputError("answers of another suite or solver", file=str(file), expected="a new folder")
         return {
             each["game"]: (GameResult.model_validate(each["answer"]), float(each["seconds"])) for each in rest

@@ -109,8 +109,8 @@ class Suite:
     @staticmethod
     def from_document(document: Mapping[str, Any], file: str | None = None) -> Suite:
         """Check a document; InputError for the first thing wrong, with its field."""
-        own = plain(document, file)
-        suite = Suite(own, parse(SuiteModel, own, file=file), file)
+        plain_document = plain(document, file)
+        suite = Suite(plain_document, parse(SuiteModel, plain_document, file=file), file)
         if suite.model.campaign is not None:
             for k, entry in enumerate(suite.model.campaign.configurations):
                 if entry.document is None:
@@ -170,15 +170,15 @@ class Suite:
         InputError
             If the suite is one of games, a controller can't be loaded, or it has not so many trials.
         """
-        own = self.document.get("campaign")
-        if own is None or self.trials is None:
+        template = self.document.get("campaign")
+        if template is None or self.trials is None:
             raise InputError("a suite of another kind, which is no campaign", file=self.file or self.name)
         if trials is not None and not 1 <= trials <= self.trials:
             raise InputError(
                 "not a number of its trials", file="--trials", value=trials, expected=f"1 to {self.trials}"
             )
         document = {
-            **own,
+            **template,
             "name": self.label,
             "trials": trials or self.trials,
             "controllers": list(controllers),

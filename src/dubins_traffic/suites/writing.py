@@ -109,7 +109,7 @@ def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
 def trials_table(suite: Suite, comparison: Comparison) -> str:
     """Return a heading, the table of the controllers, the best by the suite's metric first, and how to read it."""
     metric = SCORES[suite.model.metric].column
-    timed = [own for own in WALL_METRICS if own in comparison.metrics]
+    timed = [metric_of_time for metric_of_time in WALL_METRICS if metric_of_time in comparison.metrics]
     judged = any(standing.judged for standing in comparison.standings)
     verdicts = [ruling.value for ruling in Ruling] if judged else []
     head = [
@@ -125,11 +125,11 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
         "fault of the ego",
         "ended by the controller",
         "came to nothing",
-        *(f"{own.label}, ms" for own in timed),
+        *(f"{metric_of_time.label}, ms" for metric_of_time in timed),
     ]
     ranked = sorted(
         comparison.standings,
-        key=lambda own: [_over_all(own, name) for name in (metric.name, SECOND)],
+        key=lambda of_controller: [_over_all(of_controller, name) for name in (metric.name, SECOND)],
         reverse=True,
     )
     body = [
@@ -148,7 +148,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
             str(standing.faults["the ego"] + standing.faults["both"]),
             str(standing.ended.count),
             str(sum(standing.ends[end].count for end in rows.NOTHING if end in standing.ends)),
-            *(_milliseconds(standing.estimates[own.name].mean) for own in timed),
+            *(_milliseconds(standing.estimates[metric_of_time.name].mean) for metric_of_time in timed),
         ]
         for standing in ranked
     ]
@@ -198,9 +198,9 @@ def answers_of(suite: Suite, sources: Sequence[Source]) -> list[Answers]:
 
 def _case_lines(suite: Suite, found: Mapping[str, Columns]) -> list[list[str]]:
     cases = suite.model.cases or ()
-    rows = [[case.name, *(_said(own, k) for own in found.values())] for k, case in enumerate(cases)]
-    ended = ["ended by the controller", *(str(_ended(own)) for own in found.values())]
-    return [*rows, ["clean", *(_clean(own) for own in found.values())], ended]
+    rows = [[case.name, *(_said(columns, k) for columns in found.values())] for k, case in enumerate(cases)]
+    ended = ["ended by the controller", *(str(_ended(columns)) for columns in found.values())]
+    return [*rows, ["clean", *(_clean(columns) for columns in found.values())], ended]
 
 
 def _said(columns: Columns, case: int) -> str:
@@ -217,14 +217,14 @@ def _ended(columns: Columns) -> int:
 
 def _clean(columns: Columns) -> str:
     cut = sum(map(was_cut, columns["verdict"], columns["clean"], columns["end"]))
-    own = share(sum(bool(value) for value in columns["clean"]), len(columns["clean"]) - cut)
-    low, high = own.interval or (0.0, 1.0)
-    return f"{own.count} of {own.total} [{low:.1%}, {high:.1%}]{told_cut(cut)}"
+    clean = share(sum(bool(value) for value in columns["clean"]), len(columns["clean"]) - cut)
+    low, high = clean.interval or (0.0, 1.0)
+    return f"{clean.count} of {clean.total} [{low:.1%}, {high:.1%}]{told_cut(cut)}"
 
 
 def _game_columns(answers: Sequence[Answers]) -> list[str]:
     head = ["game", "e-agents", "assumed", "positions", "won", "realizable"]
-    return head + [f"{own.name}{what}" for own in answers for what in ("", ", s")]
+    return head + [f"{solver.name}{what}" for solver in answers for what in ("", ", s")]
 
 
 def _game_lines(suite: Suite, answers: Sequence[Answers]) -> list[list[str]]:
@@ -236,7 +236,7 @@ def _game_lines(suite: Suite, answers: Sequence[Answers]) -> list[list[str]]:
             f"{game.positions:,}",
             f"{game.winning:,}",
             _realizable(game),
-            *(cell for own in answers for cell in _verdict_and_seconds(game, own)),
+            *(cell for solver in answers for cell in _verdict_and_seconds(game, solver)),
         ]
         for game in suite.model.games or ()
     ]
@@ -248,20 +248,20 @@ def _realizable(game: GameEntry) -> str:
     return "somewhere" if game.winning else "nowhere"
 
 
-def _verdict_and_seconds(game: GameEntry, own: Answers) -> tuple[str, str]:
-    found = own.found.get(game.name)
+def _verdict_and_seconds(game: GameEntry, solver: Answers) -> tuple[str, str]:
+    found = solver.found.get(game.name)
     right = None if found is None else agrees(game, found)
-    return RIGHT[right], shown(own.seconds.get(game.name))
+    return RIGHT[right], shown(solver.seconds.get(game.name))
 
 
 def _summary(suite: Suite, answers: Sequence[Answers]) -> str:
     games = suite.model.games or ()
     lines: list[str] = []
-    for own in answers:
-        right = sum(_verdict_and_seconds(game, own)[0] == RIGHT[True] for game in games)
-        spent = sum(own.seconds.get(game.name, 0.0) for game in games)
-        took = f" in {shown(spent)} s" if own.seconds else ""
-        lines.append(f"{own.name}: {right} of {len(games)} right{took}.")
+    for solver in answers:
+        right = sum(_verdict_and_seconds(game, solver)[0] == RIGHT[True] for game in games)
+        spent = sum(solver.seconds.get(game.name, 0.0) for game in games)
+        took = f" in {shown(spent)} s" if solver.seconds else ""
+        lines.append(f"{solver.name}: {right} of {len(games)} right{took}.")
     return " ".join(lines)
 
 

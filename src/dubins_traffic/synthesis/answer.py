@@ -37,20 +37,20 @@ def strengthenings(assumption: Assumption, count: int, *, bends: bool) -> Iterat
     Those with the same parts come together, the weak ones first. `bends`: whether there are any.
     """
     words = dict.fromkeys(part_of(word) for word in WORDS)
-    own = {part_of(word): word for word in assumption.words()}
-    ladders_of = {part: [*_ladder(part, own.get(part), bends)] for part in words}
+    word_of = {part_of(word): word for word in assumption.words()}
+    ladders_of = {part: [*_ladder(part, word_of.get(part), bends)] for part in words}
     for parts in combinations((part for part in words if ladders_of[part]), count):
         ladders = [ladders_of[part] for part in parts]
         yield (
-            Assumption.parse((own | dict(zip(parts, steps, strict=True))).values())
+            Assumption.parse((word_of | dict(zip(parts, steps, strict=True))).values())
             for steps in product(*ladders)
         )
 
 
-def _ladder(part: str, own: str | None, bends: bool) -> Iterator[str]:
+def _ladder(part: str, word: str | None, bends: bool) -> Iterator[str]:
     """Yield the words of a part that are stronger than its own, the weak ones first."""
     steps = STEPS.get(part, (part,))
-    for step in steps[steps.index(own) + 1 if own in steps else 0 :]:
+    for step in steps[steps.index(word) + 1 if word in steps else 0 :]:
         if bends or step not in BENDS_ALONE:
             yield step
 

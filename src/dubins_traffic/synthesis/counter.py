@@ -68,7 +68,7 @@ class Counterstrategy:
             return int(moves[0]), debt
         turns = self._until(level, debt)
         answers = [self._answers(move) for move in moves.tolist()]
-        worst = np.array([max((turns[after] for after in own), default=0) for own in answers])
+        worst = np.array([max((turns[after] for after in answer), default=0) for answer in answers])
         return int(moves[np.argmin(worst)]), debt
 
     def _moves(self, position: int) -> Ints:
@@ -126,8 +126,8 @@ class Counterstrategy:
         ends: list[Numbers] = []
         for turns in self.solution.game.turns():
             low, high = np.searchsorted(positions, (turns.first, turns.first + len(turns.at) - 1))
-            own = positions[low:high] - turns.first
-            row, edge = _edges(turns.at, own)
+            places = positions[low:high] - turns.first
+            row, edge = _edges(turns.at, places)
             good = safe[turns.to[edge]]
             rows.append(row[good] + low)
             ends.append(turns.to[edge[good]])
@@ -259,8 +259,8 @@ def followed(board: Board, before: Moment, after: Moment) -> Moment:
     def assign(car: int) -> bool:
         if car == len(before.cells):
             return True
-        own = before.cells[car]
-        for cell in (own, *board.arena.following(own)):
+        cell_before = before.cells[car]
+        for cell in (cell_before, *board.arena.following(cell_before)):
             if cell in free:
                 free.remove(cell)
                 chosen.append(cell)

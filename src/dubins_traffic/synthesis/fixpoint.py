@@ -178,7 +178,7 @@ def reverse(at: Ints, to: Numbers, back_at: Ints, back: Numbers) -> None:
 
 
 @jit_long
-def own(owed_at: Ints, owner: Numbers) -> None:
+def assign_owners(owed_at: Ints, owner: Numbers) -> None:
     """Set `owner` (O,) to the position of each debt; those of position p begin at entry p of `owed_at` (N+1,)."""
     for position in range(owed_at.shape[0] - 1):
         for o in range(owed_at[position], owed_at[position + 1]):

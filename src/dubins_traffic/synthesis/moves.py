@@ -357,9 +357,9 @@ def _ego(t: Tables, position: int, work: Work, out: Moves) -> int:
                     used += 1
                     work.scenes[to] = before
         else:
-            own = t.taken[scene] & ~t.others_slots[scene]
+            places = t.taken[scene] & ~t.others_slots[scene]
             for slot in range(SLOTS):
-                if own >> slot & 1:
+                if places >> slot & 1:
                     cell = t.base.shape[0] + t.inbound[v, slot]
             if t.ego_entered[scene] != IMPOSSIBLE:
                 work.scenes[v] = t.ego_entered[scene]

@@ -398,11 +398,11 @@ class RoadPlay:
         inside = {cell: car for car, cell in enumerate(self.cells) if cell < nodes}
         scenes: list[Scene] = []
         for node, queue in enumerate(self._queues):
-            own = inside.get(node)
-            if own is None and not queue:
+            occupant = inside.get(node)
+            if occupant is None and not queue:
                 scenes.append(EMPTY)
                 continue
-            scenes.append(self._scene(node, own, queue))
+            scenes.append(self._scene(node, occupant, queue))
         try:
             return board.number(scenes)
         except KeyError:

@@ -39,8 +39,8 @@ def waits(arena: Arena) -> set[tuple[int, int]]:
     found: set[tuple[int, int]] = set()
     for nodes in arena.targets:
         far = distances(arena, nodes)
-        for cell, own in far.items():
-            found |= {(cell, ahead) for ahead in arena.following(cell) if far.get(ahead) == own - 1}
+        for cell, distance in far.items():
+            found |= {(cell, ahead) for ahead in arena.following(cell) if far.get(ahead) == distance - 1}
     return found
 
 

@@ -13,7 +13,7 @@ from typing import Final
 
 import numpy as np
 
-from dubins_traffic.synthesis.fixpoint import UNRANKED, Graph, Search, forced, own, reach, reverse
+from dubins_traffic.synthesis.fixpoint import UNRANKED, Graph, Search, assign_owners, forced, reach, reverse
 from dubins_traffic.synthesis.game import WORKERS, Game, Progress, room
 from dubins_traffic.synthesis.positions import Cells, Flags, Numbers, Work
 
@@ -85,7 +85,7 @@ def graph(game: Game) -> Graph:
     back = np.empty(game.ego_to.shape[0], dtype=np.int32)
     reverse(game.ego_at, game.ego_to, back_at, back)
     owner = np.empty(game.owed.shape[0], dtype=np.int32)
-    own(game.owed_at, owner)
+    assign_owners(game.owed_at, owner)
     out = room(game.board, 0, 0)
     if not game.lean:
         out = out._replace(to=game.to, moved=game.moved)

@@ -412,15 +412,15 @@ class Sights:
         self._instance = instance
         self._senses: dict[int, Senses] = {}
 
-    def take(self, tick: int, state: State, labels: Labels, own: Callable[[], Observation]) -> None:
+    def take(self, tick: int, state: State, labels: Labels, observe_ego: Callable[[], Observation]) -> None:
         """Take the next frame; `own` returns the ego's observation of it."""
-        self._tick, self._state, self._labels, self._own = tick, state, labels, own
+        self._tick, self._state, self._labels, self._observe_ego = tick, state, labels, observe_ego
         self._seen: dict[int, Observation] = {}
 
     def observe(self, car: int) -> Observation:
         """Return the observation of `car` in the present frame; the ego's is the trial's own."""
         if car == EGO:
-            return self._own()
+            return self._observe_ego()
         if car not in self._seen:
             self._seen[car] = self.sense(car, self._state)
         return self._seen[car]

@@ -58,8 +58,8 @@ def written_difference(data: bytes, head: bytes, record: Record) -> Difference |
     whole = len(expected) if is_finished(data) or len(data) > len(expected) else len(data)
     if data[:whole] == expected[:whole] and (record.ending is None or len(data) <= len(expected)):
         return None
-    for own, other in zip_longest(pieces(data), pieces(expected)):
-        found = _piece_difference(own, other)
+    for recorded, made in zip_longest(pieces(data), pieces(expected)):
+        found = _piece_difference(recorded, made)
         if found is not None:
             return found
     pairs = zip(data, expected, strict=False)
@@ -68,14 +68,14 @@ def written_difference(data: bytes, head: bytes, record: Record) -> Difference |
     return Difference(f"byte {at} of the file", found, wanted)
 
 
-def _piece_difference(own: Piece | None, other: Piece | None) -> Difference | None:
-    if own is None or other is None:
-        number = own.number if own is not None else other.number if other is not None else 0
-        found, wanted = ("a chunk" if piece is not None else None for piece in (own, other))
+def _piece_difference(recorded: Piece | None, made: Piece | None) -> Difference | None:
+    if recorded is None or made is None:
+        number = recorded.number if recorded is not None else made.number if made is not None else 0
+        found, wanted = ("a chunk" if piece is not None else None for piece in (recorded, made))
         return Difference(f"chunk {number}", found, wanted)
-    for k, (one, two) in enumerate(zip_longest(own.messages, other.messages)):
+    for k, (one, two) in enumerate(zip_longest(recorded.messages, made.messages)):
         if one != two:
-            return _message_difference(f"chunk {own.number}, message {k}", one, two)
+            return _message_difference(f"chunk {recorded.number}, message {k}", one, two)
     return None
 
 
@@ -229,8 +229,8 @@ def verify(
     beside = None if stdin or scores is not None else sheet_beside(Path(name))
     if beside is None:
         return _verified(reader.from_bytes(data, name), data, instance, scores)
-    path, own = beside
-    return replace(_verified(reader.from_bytes(data, name), data, instance, own), sheet=str(path))
+    path, sheet = beside
+    return replace(_verified(reader.from_bytes(data, name), data, instance, sheet), sheet=str(path))
 
 
 def _verified(

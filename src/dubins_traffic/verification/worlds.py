@@ -191,13 +191,13 @@ class FromPoses:
         self._tick += 1
         put_frame(self.state, self._frames, self._tick)
         self._meetings.note((*found, *self._soon.get(self._tick + 1, ())))
-        own = tuple(
+        touching = tuple(
             self._at_frames.contact(self._tick, self.state, pair)
             for pair, gap in self._meetings.gaps(self._tick, self.state)
             if gap <= -self._slack
         )
-        self._meetings.note(own)
-        return [(*found, *own)]
+        self._meetings.note(touching)
+        return [(*found, *touching)]
 
     def close(self) -> None:
         """Close the simulator within."""

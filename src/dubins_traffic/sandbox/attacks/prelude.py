@@ -24,8 +24,8 @@ MODULES = (signal, socket, struct, subprocess, threading)
 
 def call(number: int, *arguments: Any) -> int:
     """Make a system call; OSError if it fails."""
-    own = [ctypes.c_long(each) if isinstance(each, int) else each for each in arguments]
-    found: int = libc.syscall(ctypes.c_long(number), *own)
+    converted = [ctypes.c_long(each) if isinstance(each, int) else each for each in arguments]
+    found: int = libc.syscall(ctypes.c_long(number), *converted)
     if found == -1:
         error = ctypes.get_errno()
         raise OSError(error, os.strerror(error))

@@ -141,7 +141,7 @@ class Api(Controller):
         """Return the logs of a submission that may be seen: of all trials, or the tail of one."""
         told = _view(service, viewer, number)
         if "trials" in told:
-            return {"trials": [{"number": own["number"], "log": own["log"]} for own in told["trials"]]}
+            return {"trials": [{"number": trial["number"], "log": trial["log"]} for trial in told["trials"]]}
         return {"log": told.get("log", "")}
 
 

@@ -86,16 +86,16 @@ class Pages(Controller):
         at, account = service.clock(), viewer.account
         with service.database.reading() as session:
             row = receiving.found_phase(session, slug, name)
-            told, own, used = viewing.told_phase(service, row, at), [], None
+            told, mine, used = viewing.told_phase(service, row, at), [], None
             if account is not None and account.team_id is not None:
                 places = viewing.places_of(session)
                 found = receiving.submissions_of(session, row, account.team_id)
-                own = [
+                mine = [
                     viewing.told_submission(service, session, one, None, places, logs=False) for one in found
                 ]
                 used = submissions.used(session, row, account.team_id, at)
             title = row.competition.title
-        given = {"phase": told, "own": own, "used": used, "slug": slug, "competition": title}
+        given = {"phase": told, "own": mine, "used": used, "slug": slug, "competition": title}
         return page(
             service, viewer, "phase", f"{title}: {name}", largest=service.settings.largest_upload, **given
         )
@@ -148,8 +148,8 @@ class Pages(Controller):
         """Show a trial: its score, its log, its replay."""
         with service.database.reading() as session:
             submission, found = _seen(service, viewer, number, trial, session)
-            own = viewing.owns(viewer.account, submission)
-            row = found.row if own else viewing.shared(found.row)
+            is_owner = viewing.owns(viewer.account, submission)
+            row = found.row if is_owner else viewing.shared(found.row)
             given = {
                 "submission": submission,
                 "team": submission.team.name,
@@ -157,7 +157,7 @@ class Pages(Controller):
                 "row": row,
                 "phase": submission.phase.name,
                 "slug": submission.phase.competition.slug,
-                "own": own,
+                "own": is_owner,
                 "of": len(service.phase(submission.phase).numbers),
             }
         return page(service, viewer, "trial", f"Trial {trial} of submission {number}", **given)
@@ -351,7 +351,7 @@ def _sure(session: Session, viewer: Viewer, data: Form) -> Account:
 def _shown(service: Service, viewer: Viewer, code: str = "", token: str = "") -> Template:
     with service.database.reading() as session:
         team = session.get(Team, viewer.person.team_id) if viewer.person.team_id else None
-        members = [own.name for own in team.accounts] if team else []
+        members = [member.name for member in team.accounts] if team else []
         tokens = accounts.tokens(session, viewer.person)
     given = {"team": team, "members": members, "tokens": tokens, "code": code, "token": token}
     return page(service, viewer, "team", "Team and account", url=service.settings.url, **given)

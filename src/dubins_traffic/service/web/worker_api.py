@@ -198,7 +198,7 @@ def _lease(service: Service, session: Session, name: str) -> Leased | None:
         digest=submission.digest,
         phase=submission.phase.name,
         competition=dict(service.competition(submission.phase.competition).document),
-        seeds={str(own): seeds[own] for own in chunk.numbers},
+        seeds={str(number): seeds[number] for number in chunk.numbers},
     )
 
 
@@ -209,7 +209,7 @@ def _done(service: Service, session: Session, number: int, report: Report) -> No
     if report.rejected is not None and chunk.kind != "check":
         housekeeping.give_back(session, chunk.id, _note(chunk, report.rejected), at)
     elif chunk.kind != "check":
-        results = [msgspec.to_builtins(own) for own in report.trials or ()]
+        results = [msgspec.to_builtins(trial) for trial in report.trials or ()]
         submissions.record(session, chunk, results, at, service.hiding(submission.phase))
     elif report.rejected is not None:
         queue.finish(session, chunk)

@@ -66,15 +66,15 @@ class Labelled:
 
     def moved(self, place: Place, cell: int) -> Place | None:
         """Return the place after the ego has gone to a cell, None if it may not."""
-        own = place.cells[EGO]
-        if cell == own:
+        cell_now = place.cells[EGO]
+        if cell == cell_now:
             return place
         options = self._moves.of_ego(place.position)[1:]
         arena, nodes = self.board.arena, len(self.board.arena.nodes)
-        if own < nodes:
-            free = [nodes + lane for lane in arena.nodes[own].exits if nodes + lane not in place.cells]
+        if cell_now < nodes:
+            free = [nodes + lane for lane in arena.nodes[cell_now].exits if nodes + lane not in place.cells]
         else:
-            free = [arena.lane_end[own - nodes][0]]
+            free = [arena.lane_end[cell_now - nodes][0]]
         ways = dict(zip(free, options, strict=False))
         return Place(ways[cell], (cell, *place.cells[1:])) if cell in ways else None
 
@@ -124,8 +124,8 @@ class Labelled:
 def misfit(board: Board, machine: Machine) -> tuple[str, str] | None:
     """Return a proposition in which a machine and a game differ, and how; None if there is none."""
     bits = car_bits(EGO, board.arena.cells)
-    own = {*bits, *(order_name(EGO, car) for car in range(1, board.others + 1))}
-    known = own.union(inputs_of(board))
+    its_inputs = {*bits, *(order_name(EGO, car) for car in range(1, board.others + 1))}
+    known = its_inputs.union(inputs_of(board))
     for name in machine.names:
         if name not in known:
             return name, "a strategy for another problem"
@@ -134,10 +134,10 @@ def misfit(board: Board, machine: Machine) -> tuple[str, str] | None:
             return name, "a strategy for another problem"
     sides = machine.sides or Sides((), ())
     for name in sides.read:
-        if name in own:
+        if name in its_inputs:
             return name, "a strategy that reads what the ego chooses"
     for name in sides.answered:
-        if name not in own:
+        if name not in its_inputs:
             return name, "a strategy that chooses for the others"
     return None
 

@@ -114,8 +114,8 @@ class _Reader:
             raise damaged(WHAT, "a literal of no variable")
         names = self._symbols()
         named = [
-            [(names.get(f"{kind}{k}", f"{kind}{k}"), literal) for k, literal in enumerate(own)]
-            for kind, own in (("i", inputs), ("o", outputs))
+            [(names.get(f"{kind}{k}", f"{kind}{k}"), literal) for k, literal in enumerate(signals)]
+            for kind, signals in (("i", inputs), ("o", outputs))
         ]
         return Circuit(self._most, named[0], named[1], latches, self._ordered(inputs, latches, gates))
 

@@ -78,7 +78,7 @@ def _header(tokens: list[str]) -> tuple[list[str], int, Sides | None]:
     return (
         found,
         _number(start[0], 0),
-        _sides(found, [own for key, own in items if key == "controllable-AP:"]),
+        _sides(found, [item for key, item in items if key == "controllable-AP:"]),
     )
 
 
@@ -86,11 +86,11 @@ def _sides(names: list[str], lists: list[list[str]]) -> Sides | None:
     """Return which propositions are read and answered, by the lists of `controllable-AP`."""
     if not lists:
         return None
-    own = {_number(lists[0], place) for place in range(len(lists[0]))}
-    if len(lists) > 1 or any(number >= len(names) for number in own):
+    numbers = {_number(lists[0], place) for place in range(len(lists[0]))}
+    if len(lists) > 1 or any(number >= len(names) for number in numbers):
         raise damaged(WHAT, "not one controllable-AP: of its propositions", value=" ".join(lists[-1][:8]))
-    answered = [names[number] for number in sorted(own)]
-    return Sides([name for number, name in enumerate(names) if number not in own], answered)
+    answered = [names[number] for number in sorted(numbers)]
+    return Sides([name for number, name in enumerate(names) if number not in numbers], answered)
 
 
 def _number(tokens: list[str], place: int) -> int:

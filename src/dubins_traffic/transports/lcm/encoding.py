@@ -55,15 +55,15 @@ def observation_from_message(message: state_t, problem: Problem) -> Observation:
     """Return the observation, equal to the one that was sent."""
     body = problem.car.body
     generated: Any = message
-    own: car_t = message.own
+    ego: car_t = message.own
     others: list[car_t] = generated.others
     scan: tuple[float, ...] = generated.scan
     return Observation(
         message.tick,
         message.time,
-        _pose(own),
-        Twist(own.speed, own.yaw_rate),
-        _propositions(own),
+        _pose(ego),
+        Twist(ego.speed, ego.yaw_rate),
+        _propositions(ego),
         tuple(
             SensedCar(
                 car.name, car.index, _pose(car), Twist(car.speed, car.yaw_rate), body, _propositions(car)
