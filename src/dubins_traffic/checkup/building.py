@@ -81,10 +81,10 @@ def _hindrance() -> str:
 
 def entries() -> list[Entry]:
     """Return all kernels of the package that Python calls, with the kinds of their arguments."""
-    with listed() as found:
+    with listed() as compiled:
         for run in moments():
             run()
-    return [entry for entry in found if entry.kernel.__module__.startswith(OURS)]
+    return [entry for entry in compiled if entry.kernel.__module__.startswith(OURS)]
 
 
 def _checked_folder(folder: Path | None) -> Path:

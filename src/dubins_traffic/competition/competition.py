@@ -337,11 +337,11 @@ class Competition:
         model = parse(CompetitionModel, plain_document, file=file)
         try:
             check_names([entry.name for entry in model.configurations], "configurations")
-            found = tuple(
+            configurations = tuple(
                 Named(entry.name, configuration_of(entry, k, folder))
                 for k, entry in enumerate(model.configurations)
             )
-            made = Competition(_complete(plain_document, found), model, found, file, folder)
+            made = Competition(_complete(plain_document, configurations), model, configurations, file, folder)
             for name in model.phases:
                 _check_phase(made.phase(name))
         except InputError as error:

@@ -89,12 +89,12 @@ class Judged(Strict):
     @staticmethod
     def from_json(document: object, file: str | None = None) -> Judged:
         """Return what `to_json` gave; InputError if it is anything else."""
-        found = parse(Judged, document, file=file)
+        judged = parse(Judged, document, file=file)
         try:
-            found._check_row()
+            judged._check_row()
         except InputError as error:
             raise error.within(file=file) from None
-        return found
+        return judged
 
     def _check_row(self) -> None:
         """Refuse a row of another trial, or one that ranking can't read."""
@@ -229,9 +229,9 @@ class FramesHash:
 
     def frames(self, frames: Frames) -> None:
         """Take a block of frames."""
-        for name, found in self._arrays.items():
+        for name, digest in self._arrays.items():
             array = getattr(frames, name)
-            found.update(np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<")).tobytes())
+            digest.update(np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<")).tobytes())
         for contact in frames.contacts:
             self._contacts.update(_packed(contact))
 
@@ -240,7 +240,7 @@ class FramesHash:
 
     def result(self) -> str:
         """Return the SHA-256 of all frames so far, as hexadecimal digits."""
-        lines = [self._head, *(f"{name} {found.hexdigest()}" for name, found in self._arrays.items())]
+        lines = [self._head, *(f"{name} {digest.hexdigest()}" for name, digest in self._arrays.items())]
         lines.append(f"contacts {self._contacts.hexdigest()}")
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
@@ -310,18 +310,20 @@ def evaluate(
     _make_results(folder)
     with locked(folder):
         known = _begun(phase, submission, folder)
-        found = {result.number: result for result in known.results if result.counts}
-        left = [number for number in phase.numbers if number not in found]
+        by_number = {result.number: result for result in known.results if result.counts}
+        left = [number for number in phase.numbers if number not in by_number]
         work = _Work(phase, submission, seeds, trust, folder / "records" if records else None)
         if progress is not None:
-            progress(len(found), len(phase.numbers))
+            progress(len(by_number), len(phase.numbers))
         with contextlib.closing(_run(work, left, workers)) as results:
             for judged in results:
-                found[judged.number] = judged
+                by_number[judged.number] = judged
                 _append(folder / RESULTS, _line(judged.to_json()))
                 if progress is not None:
-                    progress(len(found), len(phase.numbers))
-        done = Evaluation(phase.name, phase.rules, submission.digest, tuple(found[k] for k in sorted(found)))
+                    progress(len(by_number), len(phase.numbers))
+        done = Evaluation(
+            phase.name, phase.rules, submission.digest, tuple(by_number[k] for k in sorted(by_number))
+        )
         _write(done, folder)
     return done
 
@@ -343,11 +345,11 @@ def load_evaluation(place: Path) -> Evaluation:
         raise InputError(
             "not results", file=str(path), value=head, expected="version, phase, rules, submission"
         )
-    found: dict[int, Judged] = {}
+    by_number: dict[int, Judged] = {}
     for k, line in enumerate(lines[1:], 2):
         judged = Judged.from_json(_json(line, path, k), f"{path}: line {k}")
-        found[judged.number] = judged
-    results = tuple(found[number] for number in sorted(found))
+        by_number[judged.number] = judged
+    results = tuple(by_number[number] for number in sorted(by_number))
     return Evaluation(head["phase"], head["rules"], head["submission"], results)
 
 
@@ -371,7 +373,7 @@ def load_entries(places: Sequence[str], phase: Phase) -> dict[str, tuple[Judged,
     InputError
         If one holds no results, those of another phase or of other rules, or a name stands twice.
     """
-    found: dict[str, tuple[Judged, ...]] = {}
+    results_of: dict[str, tuple[Judged, ...]] = {}
     for text in places:
         name, equals, place = text.rpartition("=")
         name = name if equals else Path(place).resolve().name
@@ -383,10 +385,10 @@ def load_entries(places: Sequence[str], phase: Phase) -> dict[str, tuple[Judged,
                 value=evaluation.phase,
                 expected=phase.name,
             )
-        if name in found:
+        if name in results_of:
             raise InputError("name taken", file=place, value=name, expected="NAME=DIR, each name once")
-        found[name] = evaluation.results
-    return found
+        results_of[name] = evaluation.results
+    return results_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -400,10 +402,10 @@ class _Work:
     def judged(self, number: int) -> Judged:
         """Return what comes of one trial."""
         seeds = {number: self.seeds[number]}
-        (found,) = judge(
+        (judged_trial,) = judge(
             self.phase, [number], self.submission, seeds=seeds, trust=self.trust, records=self.records
         )
-        return found
+        return judged_trial
 
 
 @dataclass(frozen=True, slots=True)
@@ -428,13 +430,13 @@ def _run(work: _Work, numbers: Sequence[int], workers: int) -> Generator[Judged]
         return
     errands = map(partial(_Errand, work=pickle.dumps(work)), numbers)
     with contextlib.closing(Processes(min(workers, len(numbers)))) as crew:
-        for errand, found in carry_out(crew, errands):
-            if found is None:
+        for errand, judged in carry_out(crew, errands):
+            if judged is None:
                 raise WorkerLostError(
                     f"the process ended in the middle of trial {errand.number}, each time it was run; the same command "
                     "goes on"
                 )
-            yield found
+            yield judged
 
 
 def _begun(phase: Phase, submission: Submission, folder: Path) -> Evaluation:
@@ -442,22 +444,22 @@ def _begun(phase: Phase, submission: Submission, folder: Path) -> Evaluation:
     path = folder / RESULTS
     made = Evaluation(phase.name, phase.rules, submission.digest, ())
     if path.is_file() and path.stat().st_size:
-        found = load_evaluation(path)
-        if found.head != made.head:
+        before = load_evaluation(path)
+        if before.head != made.head:
             raise InputError(
                 "holds another evaluation",
                 file=str(folder),
-                value=f"{found.phase} of {found.submission[:12]}",
+                value=f"{before.phase} of {before.submission[:12]}",
                 expected="a new folder, or that of the same submission, phase and rules",
             )
-        made = found
+        made = before
     _write(made, folder)
     return made
 
 
-def _write(found: Evaluation, folder: Path) -> None:
+def _write(evaluation: Evaluation, folder: Path) -> None:
     """Write the results in the order of their numbers: the same bytes whatever the order in which they came."""
-    text = _line(found.head) + "".join(_line(result.to_json()) for result in found.results)
+    text = _line(evaluation.head) + "".join(_line(result.to_json()) for result in evaluation.results)
     replace_file(folder / RESULTS, lambda neighbour: neighbour.write_text(text, encoding="utf-8"))
 
 
@@ -479,12 +481,12 @@ def _line(document: dict[str, Any]) -> str:
 
 def _json(line: str, path: Path, number: int) -> dict[str, Any]:
     try:
-        found: object = json.loads(line)
+        document: object = json.loads(line)
     except (ValueError, RecursionError) as error:
         raise InputError(f"line {number} is not JSON ({error})", file=str(path)) from None
-    if not isinstance(found, dict):
+    if not isinstance(document, dict):
         raise InputError(f"line {number} is not a JSON object", file=str(path))
-    return cast("dict[str, Any]", found)
+    return cast("dict[str, Any]", document)
 
 
 def _is_head(head: dict[str, Any]) -> bool:

@@ -103,21 +103,21 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
     InputError
         If an entry lacks a trial, has one twice, or one that ended by a fault of the platform and must run again.
     """
-    found = sorted(
+    ranked = sorted(
         (_entry(name, results, phase) for name, results in sorted(entries.items())),
         key=lambda entry: _merit(entry, phase),
         reverse=True,
     )
-    apart = {(one.first, one.second): one for one in _differences(found, phase)}
+    apart = {(one.first, one.second): one for one in _differences(ranked, phase)}
     places: list[Place] = []
-    for k, entry in enumerate(found):
-        equal = k > 0 and _merit(entry, phase) == _merit(found[k - 1], phase)
+    for k, entry in enumerate(ranked):
+        equal = k > 0 and _merit(entry, phase) == _merit(ranked[k - 1], phase)
         beside = [
             (one.second if one.first == entry.name else one.first)
             for one in apart.values()
             if entry.name in (one.first, one.second) and holds_zero(one.estimate)
         ]
-        following = apart[entry.name, found[k + 1].name].estimate if k + 1 < len(found) else None
+        following = apart[entry.name, ranked[k + 1].name].estimate if k + 1 < len(ranked) else None
         count = len(entry.values)
         places.append(
             Place(
@@ -172,10 +172,10 @@ def value(row: Mapping[str, Any], metric: str) -> float:
 
     Norm: docs/rules.md#ranking.
     """
-    found = row[metric]
-    if metric == "icra2016" and (found is None or row["end"] != End.DURATION):
+    score = row[metric]
+    if metric == "icra2016" and (score is None or row["end"] != End.DURATION):
         return COLLISION_SCORE
-    return 0.0 if found is None else float(found)
+    return 0.0 if score is None else float(score)
 
 
 def is_satisfied(row: Mapping[str, Any]) -> bool:
@@ -194,12 +194,12 @@ def is_cut(row: Mapping[str, Any]) -> bool:
     return was_cut(row["verdict"], row["clean"], row["end"])
 
 
-def holds_zero(found: Estimate) -> bool:
+def holds_zero(difference: Estimate) -> bool:
     """Tell whether differences are none that could be told from nothing; one difference alone tells nothing."""
     return (
-        found.count < 2
-        or found.mean_interval is None
-        or found.mean_interval[0] <= 0.0 <= found.mean_interval[1]
+        difference.count < 2
+        or difference.mean_interval is None
+        or difference.mean_interval[0] <= 0.0 <= difference.mean_interval[1]
     )
 
 
@@ -217,7 +217,7 @@ def _entry(name: str, results: Sequence[Result], phase: Phase) -> _Entry:
     values = np.array([value(row, phase.ranking.metric) for row in rows], dtype=np.float64)
     mean = float(np.sum(values)) / len(values)
     second = math.fsum(value(row, SECOND) for row in rows) / len(rows)
-    counts = (sum(map(told, rows)) for told in (is_satisfied, is_clean, is_cut))
+    counts = (sum(map(holds, rows)) for holds in (is_satisfied, is_clean, is_cut))
     return _Entry(name, values, mean, second, *counts)
 
 
@@ -226,10 +226,10 @@ def _merit(entry: _Entry, phase: Phase) -> tuple[float, float, int]:
     return entry.mean, second, entry.satisfied if phase.ranking.ties == "satisfied" else 0
 
 
-def _differences(found: Sequence[_Entry], phase: Phase) -> list[Difference]:
+def _differences(entries: Sequence[_Entry], phase: Phase) -> list[Difference]:
     column = SCORES[phase.ranking.metric].column
     made: list[Difference] = []
-    for one, other in combinations(found, 2):
+    for one, other in combinations(entries, 2):
         apart = one.values - other.values
         larger, smaller = int((apart > 0).sum()), int((apart < 0).sum())
         made.append(Difference(one.name, other.name, column, _estimated(apart.tobytes()), larger, smaller))

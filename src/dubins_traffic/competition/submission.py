@@ -54,20 +54,20 @@ def folder_files(folder: Path, bounds: Bounds) -> dict[str, bytes]:
 
     InputError if there is something that is no file or folder, can't be read, or is too much.
     """
-    found: dict[str, bytes] = {}
+    data_of: dict[str, bytes] = {}
     left = bounds.total
     try:
         for path in _walk(folder):
             name = path.relative_to(folder).as_posix()
-            _check_count(len(found) + 1, bounds)
-            found[_checked_name(name)] = data = _read(path, left, bounds)
+            _check_count(len(data_of) + 1, bounds)
+            data_of[_checked_name(name)] = data = _read(path, left, bounds)
             left -= len(data)
     except OSError as error:
         raise InputError(
             f"can't be read ({error.strerror})", file=os.fspath(error.filename or folder)
         ) from None
-    _check_names(found)
-    return found
+    _check_names(data_of)
+    return data_of
 
 
 def check_apart(folder: Path, results: Path) -> None:
@@ -104,12 +104,12 @@ def zip_files(data: bytes, bounds: Bounds) -> dict[str, bytes]:
                 raise InputError(
                     "unpacks to too much", value=declared, expected=f"at most {bounds.total >> 20} MiB"
                 )
-            found: dict[str, bytes] = {}
+            data_of: dict[str, bytes] = {}
             for entry in entries:
-                if entry.filename in found:
+                if entry.filename in data_of:
                     raise InputError("name taken", field=entry.filename, expected="each file once")
                 with archive.open(entry) as file:
-                    found[entry.filename] = file.read(entry.file_size)
+                    data_of[entry.filename] = file.read(entry.file_size)
     except (
         zipfile.BadZipFile,
         zlib.error,
@@ -121,8 +121,8 @@ def zip_files(data: bytes, bounds: Bounds) -> dict[str, bytes]:
         OSError,
     ) as error:
         raise InputError(f"a damaged archive ({error})", expected="a zip archive") from None
-    _check_names(found)
-    return found
+    _check_names(data_of)
+    return data_of
 
 
 def without_folder(files: dict[str, bytes], wanted: frozenset[str]) -> dict[str, bytes]:

@@ -72,12 +72,12 @@ def visible(
     shows = "all" if phase.is_closed(now) else phase.shows
     if shows == "nothing":
         return _hidden(phase, state, results)
-    told: dict[str, Any] = {**_head(phase, state), "state": state.state, "reason": state.reason}
-    told |= {"owner": state.owner, "place": state.place}
+    document: dict[str, Any] = {**_head(phase, state), "state": state.state, "reason": state.reason}
+    document |= {"owner": state.owner, "place": state.place}
     if shows == "aggregates":
-        return {**told, **_aggregates(phase, state, results)}
+        return {**document, **_aggregates(phase, state, results)}
     return {
-        **told,
+        **document,
         "done": len(results),
         "of": len(phase.numbers),
         "summary": summary(phase, results),
@@ -110,18 +110,18 @@ def _hidden(phase: Phase, state: SubmissionState, results: Sequence[Judged]) -> 
 
 def _aggregates(phase: Phase, state: SubmissionState, results: Sequence[Judged]) -> dict[str, Any]:
     """Return rounded aggregates over all trials, if they are done and enough, and a tail of one log."""
-    told: dict[str, Any] = {"done": len(results), "of": len(phase.numbers), "summary": None}
+    document: dict[str, Any] = {"done": len(results), "of": len(phase.numbers), "summary": None}
     if state.state == "failed" and state.owner == "platform":
-        told["reason"] = OUR_FAULT
+        document["reason"] = OUR_FAULT
     enough = len(phase.numbers) >= phase.model.least_trials
     if state.state == "done" and enough and not missing(results, phase):
-        told["summary"] = summary(phase, results, phase.model.digits)
+        document["summary"] = summary(phase, results, phase.model.digits)
     ordered = sorted(results, key=lambda result: result.number)
     at_fault = [result for result in ordered if result.owner == "submission"]
-    told["faults"] = sorted({result.end for result in at_fault})
+    document["faults"] = sorted({result.end for result in at_fault})
     shown = (at_fault or ordered[-1:])[:1]
-    told["log"] = tail(shown[0].log, phase.model.log_lines) if shown else ""
-    return told
+    document["log"] = tail(shown[0].log, phase.model.log_lines) if shown else ""
+    return document
 
 
 def summary(phase: Phase, results: Sequence[Judged], digits: int | None = None) -> dict[str, Any] | None:
@@ -130,11 +130,11 @@ def summary(phase: Phase, results: Sequence[Judged], digits: int | None = None) 
     if not rows:
         return None
     metric = phase.ranking.metric
-    found = {
+    figures = {
         metric: sum(value(row, metric) for row in rows) / len(rows),
         SECOND: sum(value(row, SECOND) for row in rows) / len(rows),
         "satisfied": sum(map(is_satisfied, rows)) / len(rows),
         "clean": sum(map(is_clean, rows)) / max(1, len(rows) - sum(map(is_cut, rows))),
     }
-    told = {name: number if digits is None else round(number, digits) for name, number in found.items()}
-    return {"trials": len(rows), **told}
+    rounded = {name: number if digits is None else round(number, digits) for name, number in figures.items()}
+    return {"trials": len(rows), **rounded}

@@ -30,8 +30,8 @@ def count_cars(rows: Ints, tick: int, outlook: OutlookTables, steps: StepTables)
 
 
 @jit
-def tell_cars(rows: Ints, cars: int, told: Flats, outlook: OutlookTables, steps: StepTables) -> None:
-    """Write what the cars of some `rows` (K,) observe, and into `told` (V, T) what they are told of the ego.
+def tell_cars(rows: Ints, cars: int, facts: Flats, outlook: OutlookTables, steps: StepTables) -> None:
+    """Write what the cars of some `rows` (K,) observe, and into `facts` (V, T) what they are told of the ego.
 
     `cars` (count) is how many rows a trial has; its first row is the ego's.
     """
@@ -39,7 +39,7 @@ def tell_cars(rows: Ints, cars: int, told: Flats, outlook: OutlookTables, steps:
         row: int = rows[k]
         write_flat(row, EGO, steps.flat[row], outlook)
         number = row % cars
-        _tell(row, row - number, 0 if number == 0 else 1, told[row], outlook, steps)
+        _tell(row, row - number, 0 if number == 0 else 1, facts[row], outlook, steps)
 
 
 @jit

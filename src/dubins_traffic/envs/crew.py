@@ -74,14 +74,14 @@ class Blame:
 
         That is ``E1`` to ``E6`` of an e-agent's, and the rule itself of the ego's.
         """
-        found: list[tuple[Breach, str]] = []
+        counted: list[tuple[Breach, str]] = []
         for breach in sorted(breaches, key=lambda one: (one.tick, one.car == EGO, *order(one))):
             part = breach.rule if breach.car == EGO else assumption_of(breach.rule)
             if self._counts(breach, part):
-                found.append((breach, part))
+                counted.append((breach, part))
                 if self.first is None:
                     self.first, self._since = breach.car, breach.tick
-        return found
+        return counted
 
     def _counts(self, breach: Breach, part: str) -> bool:
         if breach.car == EGO:
@@ -167,12 +167,12 @@ class Crew:
         self._observe(np.arange(trials, dtype=np.int64))
 
     def _shielded(self, problems: Any, cast: Cast) -> list[CarShields]:
-        found: list[CarShields] = []
+        shields_of_cars: list[CarShields] = []
         for overtakes in dict.fromkeys(cast.shields.values()):
             cars: Bools = np.zeros(self.group.state.x.shape, dtype=np.bool_)
             cars[:, [car for car, shield in cast.shields.items() if shield == overtakes]] = True
-            found.append(CarShields(problems, self._views, cars, overtakes=overtakes))
-        return found
+            shields_of_cars.append(CarShields(problems, self._views, cars, overtakes=overtakes))
+        return shields_of_cars
 
     def step(self, asked: Floats, ticks: int) -> None:
         """Step all trials that have not ended by up to `ticks` ticks.

@@ -86,12 +86,12 @@ class Episodes:
         groups: dict[tuple[int, int], list[int]] = {}
         for place, (seed, trial) in enumerate(numbered):
             groups.setdefault((seed, self._level_of(seed, trial)), []).append(place)
-        found: dict[int, Instance] = {}
+        by_place: dict[int, Instance] = {}
         for (seed, level), places in groups.items():
             configuration = self.configuration if level < 0 else self._level(level)
             drawn = draw_many(configuration, seed, [numbered[place][1] for place in places])
-            found.update(zip(places, drawn, strict=True))
-        return [found[place] for place in range(len(numbered))]
+            by_place.update(zip(places, drawn, strict=True))
+        return [by_place[place] for place in range(len(numbered))]
 
     def _level_of(self, seed: int, trial: int) -> int:
         """Return the number of a trial's level, -1 without a pool."""

@@ -83,11 +83,11 @@ class Renderer:
 
     def render_all(self, fleet: Fleet) -> tuple[Image | None, ...]:
         """Return or show the present frames of the trials of all environments."""
-        found: list[Image | None] = []
+        images: list[Image | None] = []
         for env in range(len(fleet)):
             bank, row = fleet.seat(env)
-            found.append(self.render(bank.group, row, bank.outlook, row, env))
-        return tuple(found)
+            images.append(self.render(bank.group, row, bank.outlook, row, env))
+        return tuple(images)
 
     def close(self) -> None:
         """Close the page, if there is one."""
@@ -109,9 +109,9 @@ def _marks(group: Group, b: int) -> Floats:
     if not contacts and not breaches:
         return NO_MARKS
     rate, now = group.instances[b].problem.rate, int(group.ticks[b])
-    found = [(one.x, one.y, MARKS.CONTACT, (now - one.tick) / rate) for one in contacts]
-    found += [
+    marks = [(one.x, one.y, MARKS.CONTACT, (now - one.tick) / rate) for one in contacts]
+    marks += [
         (one.x, one.y, MARKS.OWN if one.car == EGO else MARKS.OTHERS, (now - one.tick) / rate)
         for one in (*breaches, *accused(contacts))
     ]
-    return np.array(found, dtype=np.float64)
+    return np.array(marks, dtype=np.float64)

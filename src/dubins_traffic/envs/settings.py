@@ -150,14 +150,14 @@ class Settings:
             )
         if self.formulas:
             with_formulas(sample, self.formulas)
-        found = {
+        parts = {
             "episodes": episodes,
             "actions": ActionMap(self.action, sample.problem.car.bounds),
             "weights": weights_of(self.reward),
             "sample": sample,
             "layout": Layout.of(sample.problem, self.cars),
         }
-        for name, value in found.items():
+        for name, value in parts.items():
             object.__setattr__(self, name, value)
 
     @property

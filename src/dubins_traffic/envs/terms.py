@@ -150,5 +150,5 @@ class Pay:
             task = (TERM.VISITS, TERM.ROUNDS, TERM.PROGRESS)
             done["spoiled"] = -float(sum(terms[EGO, k] * self._ego[k] for k in task))
             done["violated"] = float(broken[EGO, :AT_FAULT].sum())
-        found = {name: weight * {**done, **parts}[name] for name, weight in self._others.items()}
-        return sum(found.values()), {"reward_terms": found, "cost": parts}
+        terms_of_car = {name: weight * {**done, **parts}[name] for name, weight in self._others.items()}
+        return sum(terms_of_car.values()), {"reward_terms": terms_of_car, "cost": parts}

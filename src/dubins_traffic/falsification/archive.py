@@ -48,13 +48,13 @@ class Journal:
         self._lines: dict[Key, str] = {}
         self._waiting: list[Finished] = []
         self._written = time.monotonic()
-        told = read_bytes(path).decode(errors="replace").splitlines(keepends=True) if path.is_file() else []
-        for line in told:
+        lines = read_bytes(path).decode(errors="replace").splitlines(keepends=True) if path.is_file() else []
+        for line in lines:
             checksum, _, text = line.partition(" ")
             if checksum == _checksum(text):
                 number, digest, _ = json.loads(text)
                 self._lines[number, digest] = line
-        self._sound = 0 < len(self._lines) == len(told)
+        self._sound = 0 < len(self._lines) == len(lines)
 
     def known(self, number: int, genome: Genome) -> Tried | None:
         """Return what came of a trial; None if it is not here."""
@@ -174,13 +174,13 @@ class Archive:
         path = self.folder / STATE
         if not path.is_file():
             return None
-        found = parse_json(read_text(path), str(path))
-        if "state" not in found or found.get("sha256") != _digest(found["state"]):
+        document = parse_json(read_text(path), str(path))
+        if "state" not in document or document.get("sha256") != _digest(document["state"]):
             raise InputError(
                 "not the state of a search as it was written", file=str(path), field="sha256",
-                value=found.get("sha256"), expected="the hash of `state`; begin anew in another folder",
+                value=document.get("sha256"), expected="the hash of `state`; begin anew in another folder",
             )  # fmt: skip
-        return found["state"]
+        return document["state"]
 
     def remember(self, state: Mapping[str, Any]) -> None:
         """Write down where the search goes on; once this returns, it survives a loss of power."""

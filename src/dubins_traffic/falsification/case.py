@@ -100,18 +100,20 @@ def read_case(path: str | os.PathLike[str]) -> Case:
 
 def case_of(instance: Instance, name: str | None = None) -> Case:
     """Return the case that the document of an instance carries; `name` is the file that errors mention."""
-    found: Any = instance.extra.get(KEY)
+    story_document: Any = instance.extra.get(KEY)
     expected = "an object with rule, manoeuvre, degree, controller, time, tick and sentence"
-    if not isinstance(found, Mapping):
-        raise InputError("not a case", file=name, field=KEY, value=found, expected=expected)
-    told = cast("Mapping[str, Any]", found)
+    if not isinstance(story_document, Mapping):
+        raise InputError("not a case", file=name, field=KEY, value=story_document, expected=expected)
+    document = cast("Mapping[str, Any]", story_document)
     try:
-        story = Story(**told)
+        story = Story(**document)
         _check_kinds(story, name)
         if story.manoeuvre.upper() not in Manoeuvre.__members__:
             raise InputError("no manoeuvre", file=name, field=f"{KEY}.manoeuvre", value=story.manoeuvre)
     except (TypeError, AttributeError):
-        raise InputError("not a case", file=name, field=KEY, value=sorted(told), expected=expected) from None
+        raise InputError(
+            "not a case", file=name, field=KEY, value=sorted(document), expected=expected
+        ) from None
     return Case(instance, story)
 
 
@@ -265,12 +267,12 @@ class Judged:
         limit = limit_of(problem)
         if limit is None or late is None or late >= 0.0:
             return None
-        found = first_overdue(self.record, limit)
-        if found is None:
+        overdue = first_overdue(self.record, limit)
+        if overdue is None:
             return None
-        x, y = float(frames.x[found.tick, EGO]), float(frames.y[found.tick, EGO])
-        times = found.tick / frames.rate, found.tick, found.since / frames.rate
-        return Violation(LIVENESS, EGO_NAME, *times, Place(x, y, found.goal, None))
+        x, y = float(frames.x[overdue.tick, EGO]), float(frames.y[overdue.tick, EGO])
+        times = overdue.tick / frames.rate, overdue.tick, overdue.since / frames.rate
+        return Violation(LIVENESS, EGO_NAME, *times, Place(x, y, overdue.goal, None))
 
 
 def judge(instance: Instance, make: Make, name: str) -> Judged:
@@ -286,8 +288,8 @@ def judge(instance: Instance, make: Make, name: str) -> Judged:
     document = json.loads(json.dumps(instance_to_document(instance)))
     again = instance_from_document(document)
     record = make.drive(again) if isinstance(make, Remote) else _recorded(again, make, name)
-    found, passages = judged_record(record)
-    return Judged(record, found, tried_of(found, record.ending, passages, 0, record.instance))
+    judged_score, passages = judged_record(record)
+    return Judged(record, judged_score, tried_of(judged_score, record.ending, passages, 0, record.instance))
 
 
 def _recorded(instance: Instance, make: Maker, name: str) -> Record:
@@ -309,21 +311,21 @@ def confirm(instance: Instance, rule: str, make: Make, name: str) -> Judged | No
     breach = first.first(rule)
     if breach is None:
         return None
-    found = judge(cut_to(instance, breach.tick), make, name)
-    return found if found.breach(rule) is not None else None
+    cut = judge(cut_to(instance, breach.tick), make, name)
+    return cut if cut.breach(rule) is not None else None
 
 
 def case_in(instance: Instance, cell: Cell, make: Make, name: str) -> Case | None:
     """Return an instance as a case of the ego's failure in a cell, judged afresh; None if it does not stand."""
-    found = confirm(instance, cell.rule, make, name)
-    breach = None if found is None else found.breach(cell.rule)
-    if found is None or breach is None:
+    confirmed = confirm(instance, cell.rule, make, name)
+    breach = None if confirmed is None else confirmed.breach(cell.rule)
+    if confirmed is None or breach is None:
         return None
     story = Story(
         cell.rule, cell.manoeuvre.name.lower(), cell.degree, name, breach.time, breach.tick,
-        sentence_of(found.record, found.score, breach),
+        sentence_of(confirmed.record, confirmed.score, breach),
     )  # fmt: skip
-    return Case(found.record.instance, story)
+    return Case(confirmed.record.instance, story)
 
 
 def write_page(

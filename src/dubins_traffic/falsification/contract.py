@@ -71,19 +71,19 @@ def keeps_law(agent: EAgent) -> bool:
 
 def kept(verdict: Verdict, passages: Passages, trial: int, instance: Instance) -> Kept:
     """Return what came of the contract in number `trial` of `passages`, the trial of an instance, by its verdict."""
-    found = Kept()
+    contract = Kept()
     provoked = provocation(verdict, instance)
     if provoked is not None or any(keeps_law(agent) for agent in instance.e_agents):
-        found.margins[PROVOKED] = 1.0 if provoked is None else -1.0
+        contract.margins[PROVOKED] = 1.0 if provoked is None else -1.0
     if provoked is not None:
-        found.frames[PROVOKED] = provoked.tick
+        contract.frames[PROVOKED] = provoked.tick
     wait = _longest_wait(verdict, passages, trial, instance)
     if wait is not None:
         spare, tick = wait
-        found.margins[BLOCKED] = spare
+        contract.margins[BLOCKED] = spare
         if spare < 0.0:
-            found.frames[BLOCKED] = tick
-    return found
+            contract.frames[BLOCKED] = tick
+    return contract
 
 
 def provocation(verdict: Verdict, instance: Instance) -> Violation | None:
@@ -122,9 +122,11 @@ def breach_of(target: str, tick: int, verdict: Verdict, record: Record) -> Viola
     """Return a breach of the contract, in a frame of a record, as one of the car that is concerned."""
     frames = record.frames
     if target == PROVOKED:
-        found = provocation(verdict, record.instance)
-        if found is not None:
-            return Violation(target, found.car, found.time, found.tick, found.since, found.where)
+        provoked = provocation(verdict, record.instance)
+        if provoked is not None:
+            return Violation(
+                target, provoked.car, provoked.time, provoked.tick, provoked.since, provoked.where
+            )
     x, y = float(frames.x[tick, EGO]), float(frames.y[tick, EGO])
     since = tick - 1 - _ticks(limit_of(record.instance.problem) or 0.0, frames.rate)
     return Violation(

@@ -71,54 +71,57 @@ class Replicas:
 
 def combined(runs: Sequence[Split], particles: int) -> Replicas:
     """Return what at least two independent runs of so many particles say together."""
-    found = [run.probability for run in runs]
-    mean = math.fsum(found) / len(runs)
+    probabilities = [run.probability for run in runs]
+    mean = math.fsum(probabilities) / len(runs)
     trials, branches = sum(run.trials for run in runs), sum(run.branches for run in runs)
-    extinct = sum(value == 0.0 for value in found)
+    extinct = sum(value == 0.0 for value in probabilities)
     counted = clopper_pearson(sum(run.counted for run in runs), len(runs) * particles)
     # Equal estimates show no spread, which says nothing of it: then Monte Carlo's trials have the word.
-    flat = len(set(found)) == 1
-    interval = counted if branches == 0 or mean == 0.0 else (mean, mean) if flat else korn_graubard(found)
+    flat = len(set(probabilities)) == 1
+    interval = (
+        counted if branches == 0 or mean == 0.0 else (mean, mean) if flat else korn_graubard(probabilities)
+    )
     if 2 * extinct > len(runs) or flat:
         interval = min(interval[0], counted[0]), max(interval[1], counted[1])
     repeated = sum(run.repeated for run in runs) / branches if branches else 0.0
-    equal = trials if branches == 0 or (flat and mean > 0.0) else worth(found) if mean > 0.0 else None
+    equal = trials if branches == 0 or (flat and mean > 0.0) else worth(probabilities) if mean > 0.0 else None
     lost = equal is None or equal <= trials or 2 * extinct > len(runs)
     better = MONTE_CARLO if lost else SPLITTING
-    told = Replicas(mean, interval, trials, extinct, repeated, equal, better)
-    return replace(told, advice=_advice(told, len(runs), particles))
+    replicas = Replicas(mean, interval, trials, extinct, repeated, equal, better)
+    return replace(replicas, advice=_advice(replicas, len(runs), particles))
 
 
-def _advice(found: Replicas, runs: int, particles: int) -> tuple[str, ...]:
+def _advice(replicas: Replicas, runs: int, particles: int) -> tuple[str, ...]:
     """Return what a user should know of runs, in sentences."""
-    told: list[str] = []
-    if found.extinct == runs:
-        told.append(
+    sentences: list[str] = []
+    if replicas.extinct == runs:
+        sentences.append(
             f"no run got there: that does not say that it can't happen, only that its probability is at most "
-            f"{found.interval[1]:.2g} (95 %), by the first {runs * particles} trials"
+            f"{replicas.interval[1]:.2g} (95 %), by the first {runs * particles} trials"
         )
-    elif found.extinct:
+    elif replicas.extinct:
         wider = f"; the interval reaches around that of their first {runs * particles} trials"
-        told.append(
-            f"{found.extinct} of {runs} runs ended without the event{wider if 2 * found.extinct > runs else ''}"
+        sentences.append(
+            f"{replicas.extinct} of {runs} runs ended without the event{wider if 2 * replicas.extinct > runs else ''}"
         )
-    if found.repeated > MOST_REPEATED:
-        told.append(
-            f"{found.repeated:.0%} of the trials that were branched off came to the margin of their parents: little is "
-            "left to chance where they branch off"
+    if replicas.repeated > MOST_REPEATED:
+        sentences.append(
+            f"{replicas.repeated:.0%} of the trials that were branched off came to the margin of their parents: little "
+            "is left to chance where they branch off"
         )
-    if found.worth is None:
-        bound = clopper_pearson(0, found.trials)[1]
-        told.append(
-            f"Monte Carlo is better here: {found.trials} trials without the event would bound it by {bound:.2g}"
+    if replicas.worth is None:
+        bound = clopper_pearson(0, replicas.trials)[1]
+        sentences.append(
+            f"Monte Carlo is better here: {replicas.trials} trials without the event would bound it by {bound:.2g}"
         )
-    elif found.better == MONTE_CARLO:
-        told.append(
-            f"Monte Carlo is better here: about {found.worth:.0f} trials of it vary as much as these {found.trials}"
+    elif replicas.better == MONTE_CARLO:
+        sentences.append(
+            f"Monte Carlo is better here: about {replicas.worth:.0f} trials of it vary as much as "
+            f"these {replicas.trials}"
         )
     else:
-        told.append(f"Monte Carlo would need about {found.worth:.0f} trials to vary as little")
-    return tuple(told)
+        sentences.append(f"Monte Carlo would need about {replicas.worth:.0f} trials to vary as little")
+    return tuple(sentences)
 
 
 METHODS: Final = ("monte-carlo", "splitting")
@@ -242,13 +245,13 @@ def estimate(
         raise InputError("not a margin", file="--below", value=below, expected="a finite number")
     config = prepared(config, duration, {})
     name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
-    told = progress or _silent
+    notify = progress or _silent
     if method == "splitting":
         begin = beginner(controller, event)
-        return by_splitting(drawn(config, seed), begin, event, below, particles, runs, seed, told)
+        return by_splitting(drawn(config, seed), begin, event, below, particles, runs, seed, notify)
     count = trials or 10_000
     with crew_of(controller, name, workers, None) as crew:
-        return by_counting(draw_many(config, seed, range(count)), crew, event, below, told)
+        return by_counting(draw_many(config, seed, range(count)), crew, event, below, notify)
 
 
 def by_counting(
@@ -278,14 +281,14 @@ def by_counting(
     if waiting:
         run()
     known = counts.trials - left_out
-    told = (), left_out, counts.fault_notice()
+    rest = (), left_out, counts.fault_notice()
     if not known:
         return Probability(
-            "monte-carlo", words(event, below), math.nan, (0.0, 1.0), None, counts.trials, 0, 0, *told
+            "monte-carlo", words(event, below), math.nan, (0.0, 1.0), None, counts.trials, 0, 0, *rest
         )
     return Probability(
         "monte-carlo", words(event, below), happened / known, clopper_pearson(happened, known),
-        wilson(happened, known), counts.trials, happened, counts.discarded, *told,
+        wilson(happened, known), counts.trials, happened, counts.discarded, *rest,
     )  # fmt: skip
 
 
@@ -304,11 +307,11 @@ def by_splitting(
         instances = draw(range(some.start * particles, some.stop * particles))
         before = sum(done.trials for done in splits)
         splits += split(instances, begin, below, dice, lambda done, before=before: progress(before + done))
-    found = combined(splits, particles)
+    whole = combined(splits, particles)
     each = tuple(done.probability for done in splits)
     return Probability(
-        "splitting", words(event, below), found.probability, found.interval, None, found.trials, None, None, each,
-        replicas=found,
+        "splitting", words(event, below), whole.probability, whole.interval, None, whole.trials, None, None, each,
+        replicas=whole,
     )  # fmt: skip
 
 
@@ -316,9 +319,9 @@ def drawn(configuration: Configuration, seed: int) -> Callable[[range], list[Ins
     """Return what draws the instances of numbers from a configuration, all of the longest duration that it allows."""
 
     def draw(numbers: range) -> list[Instance]:
-        found = list(draw_many(configuration, seed, numbers))
-        longest = max(instance.duration for instance in found)
-        return [one if one.duration == longest else replace(one, duration=longest) for one in found]
+        trials_drawn = list(draw_many(configuration, seed, numbers))
+        longest = max(instance.duration for instance in trials_drawn)
+        return [one if one.duration == longest else replace(one, duration=longest) for one in trials_drawn]
 
     return draw
 

@@ -157,8 +157,8 @@ def lots_of(base: Instance) -> Lots:
     """Return where cars may start on the roads of an instance; kept with the network."""
     problem = base.problem
     key = _FREE, problem.car, problem.intersection_radius, problem.obstacles
-    found = problem.network.known.get(key)
-    if found is None:
+    lots = problem.network.known.get(key)
+    if lots is None:
         ground = Ground(problem.network, problem.car, problem.intersection_radius, problem.obstacles)
         lines, free = areas_of(ground).outside.tables()
         columns = np.column_stack((lines[free.lane], free.low, free.high)).tolist()
@@ -172,8 +172,8 @@ def lots_of(base: Instance) -> Lots:
             first.setdefault(lot.lane, k)
             last[lot.lane] = k
         ends = {lane: problem.network.lane_ends(lane) for lane in first}
-        found = problem.network.known[key] = Lots(places, _near(places), first, last, ends)
-    return found  # pyright: ignore[reportReturnType]  # what stands under our own key
+        lots = problem.network.known[key] = Lots(places, _near(places), first, last, ends)
+    return lots  # pyright: ignore[reportReturnType]  # what stands under our own key
 
 
 def _square(x: float, y: float) -> tuple[int, int]:
@@ -356,5 +356,5 @@ def _with_car(
         if car in genome.whims
         else replace(genome, tables={**genome.tables, car: other.tables[car]})
     )
-    found = started(taken, base, starts, {car: starts[car]})
-    return genome if found is taken else found
+    moved = started(taken, base, starts, {car: starts[car]})
+    return genome if moved is taken else moved

@@ -214,15 +214,15 @@ def _held(flags: Ints, wanted: int) -> Bools:
 
 def _lanes(network: RoadNetwork) -> tuple[npt.NDArray[Any], ...]:
     """Return the first columns of `_Ground` for the lanes of a network; they are kept with it."""
-    found = network.known.get(_LANES)
-    if found is None:
+    lanes = network.known.get(_LANES)
+    if lanes is None:
         ends = network.degrees[network.ends]
         head = np.stack([ends[:, 1], ends[:, 0]], axis=1).ravel()
         tail = np.stack([ends[:, 0], ends[:, 1]], axis=1).ravel()
         tangent = np.stack([network.tangents, -network.tangents], axis=1).reshape(-1, 2)
         into, out_of = network.ends[:, ::-1].ravel(), network.ends.ravel()
-        found = network.known[_LANES] = head, tail, into, out_of, tangent
-    return found  # pyright: ignore[reportReturnType]  # what stands under our own key
+        lanes = network.known[_LANES] = head, tail, into, out_of, tangent
+    return lanes  # pyright: ignore[reportReturnType]  # what stands under our own key
 
 
 _LANES = "falsify lanes"

@@ -82,10 +82,10 @@ def cases_in(folder: str | os.PathLike[str]) -> list[tuple[Path, Case]]:
     place = Path(folder)
     if not place.is_dir():
         raise InputError("no such folder", file=str(place), expected="a folder of cases")
-    found = [(path, read_case(path)) for path in files(place)]
-    if not found:
+    cases = [(path, read_case(path)) for path in files(place)]
+    if not cases:
         raise InputError("no case in it", file=str(place), expected="files *.json that `falsify` wrote")
-    return found
+    return cases
 
 
 def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remote) -> Iterator[Outcome]:
@@ -103,10 +103,10 @@ def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remot
         if case.story.rule not in EGO_RULES and (asked := judged.breach(case.story.rule)) is not None:
             breaches = [*breaches, asked]
         fault = ending if ending is not None and ending.end in FAULTS else None
-        said = verdict.verdict.value if fault is None else fault.end.value
+        outcome = verdict.verdict.value if fault is None else fault.end.value
         of_it = [broken for broken in breaches if broken.rule == case.story.rule] or breaches
-        told = sentence_of(judged.record, judged.score, of_it[0]) if breaches else ""
-        yield Outcome(path, case, said, _rules(breaches), told, "" if fault is None else str(fault))
+        sentence = sentence_of(judged.record, judged.score, of_it[0]) if breaches else ""
+        yield Outcome(path, case, outcome, _rules(breaches), sentence, "" if fault is None else str(fault))
 
 
 def _rules(breaches: Sequence[Violation]) -> tuple[str, ...]:

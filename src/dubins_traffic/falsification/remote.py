@@ -119,10 +119,10 @@ class Remote:
         for result in self._session:
             assert result.record is not None
             self._say = quiet
-            found = replace(read(result.record), wall=None, file=None)
+            record = replace(read(result.record), wall=None, file=None)
             remove_record(result.record)
             if result.ending.end is not End.RESET:
-                return found
+                return record
         raise KeyboardInterrupt
 
     def close(self) -> None:

@@ -203,8 +203,8 @@ def shrink(
     make = driver_of(driver)
     name = driver if isinstance(driver, str) else begun.story.controller
     shrinker = _Shrinker(driver, make, name, begun.story.rule)
-    found = confirm(begun.instance, begun.story.rule, make, name)
-    if found is None:
+    failing = confirm(begun.instance, begun.story.rule, make, name)
+    if failing is None:
         ending = judge(begun.instance, make, name).record.ending
         if ending is not None and ending.by_controller:
             raise ControllerError(ending.end.value, f"the case ended by a fault: {ending}")
@@ -213,19 +213,19 @@ def shrink(
             "the ego does not break the rule", file=file, field="case.rule", value=begun.story.rule,
             expected="a case that fails with this controller",
         )  # fmt: skip
-    found = shrinker.shrunk(found, progress)
-    return retold(begun.story, name, found)
+    failing = shrinker.shrunk(failing, progress)
+    return retold(begun.story, name, failing)
 
 
-def retold(story: Story, name: str, found: Judged) -> Case:
+def retold(story: Story, name: str, judged: Judged) -> Case:
     """Return a case like one that is known, with what has now been judged of it."""
-    breach = found.breach(story.rule)
+    breach = judged.breach(story.rule)
     if breach is None:
         raise DubinsTrafficError("a case without its breach")
-    told = sentence_of(found.record, found.score, breach)
+    sentence = sentence_of(judged.record, judged.score, breach)
     return Case(
-        replace(found.record.instance, extra={}),
-        replace(story, controller=name, time=breach.time, tick=breach.tick, sentence=told),
+        replace(judged.record.instance, extra={}),
+        replace(story, controller=name, time=breach.time, tick=breach.tick, sentence=sentence),
     )
 
 
@@ -245,22 +245,22 @@ class _Shrinker:
         self._runner = TrialRunner(driver)
         self._make, self._name, self._rule = make, name, rule
 
-    def shrunk(self, found: Judged, progress: Progress | None) -> Judged:
+    def shrunk(self, failing: Judged, progress: Progress | None) -> Judged:
         """Return what is left when nothing more can be taken away."""
         smaller = True
         while smaller:
             smaller = False
             for way in WAYS:
-                while (less := self._less(found, way)) is not None:
-                    what, found = less
+                while (less := self._less(failing, way)) is not None:
+                    what, failing = less
                     smaller = True
                     if progress is not None:
                         progress(what)
-        return found
+        return failing
 
-    def _less(self, found: Judged, way: Way) -> tuple[str, Judged] | None:
+    def _less(self, failing: Judged, way: Way) -> tuple[str, Judged] | None:
         """Return the first instance with one thing less in which the breach stands."""
-        record = found.record
+        record = failing.record
         tried = [
             (what, smaller) for what, smaller in way(record.instance, record.frames) if _is_sound(smaller)
         ]
@@ -270,7 +270,7 @@ class _Shrinker:
         for (what, smaller), came in zip(tried, findings, strict=True):
             if any(cell.rule == self._rule for cell, _ in came.cells):
                 again = confirm(smaller, self._rule, self._make, self._name)
-                if again is not None and self._keeps_lead(again, found):
+                if again is not None and self._keeps_lead(again, failing):
                     return what, again
         return None
 

@@ -166,11 +166,11 @@ class Run:
         self._children = [self._particles[parent].branched(point, seed) for parent, point, seed in drawn]
         return self._children
 
-    def replace(self, found: Paths) -> None:
-        """Put the children in the places of what was given up; `found` is what came of them."""
+    def replace(self, followed: Paths) -> None:
+        """Put the children in the places of what was given up; `followed` is what came of them."""
         self._branches += len(self._lost)
-        self._repeated += int((found.margins == self._paths.margins[self._parents]).sum())
-        self._paths.scores[self._lost], self._paths.margins[self._lost] = found
+        self._repeated += int((followed.margins == self._paths.margins[self._parents]).sum())
+        self._paths.scores[self._lost], self._paths.margins[self._lost] = followed
         for place, child in zip(self._lost.tolist(), self._children, strict=True):
             self._particles[place] = child
 
@@ -241,7 +241,7 @@ def follow(
     Checkpoint 0 is the first frame, and there is one every `every` ticks, the last at the end.
     """
     running = company.fork([particle.first for particle in particles])
-    found = [running.levels()]
+    levels = [running.levels()]
     present = [seeds[particle.first] for particle in particles]
     done = checkpoint = 0
     while done < ticks:
@@ -253,8 +253,8 @@ def follow(
         running.advance(step)
         done += step
         checkpoint += 1
-        found.append(running.levels())
-    return Paths(np.minimum.accumulate(np.stack(found, axis=1), axis=1), running.margins())
+        levels.append(running.levels())
+    return Paths(np.minimum.accumulate(np.stack(levels, axis=1), axis=1), running.margins())
 
 
 COLUMNS: Final = {"1.road": "road", "2.left": "line", "2.return": "back", "2.turn": "turn"}

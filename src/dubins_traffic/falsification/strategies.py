@@ -94,17 +94,17 @@ class Evolution:
         kept = self._kept()
         self._source.forget({genome.base for genome in kept})
         self._source.draw([number for number in numbers if number not in parents])
-        found: list[Genome] = []
+        proposed: list[Genome] = []
         for number in numbers:
             parent, dice = parents.get(number), self._source.dice(number, Stream.CHANGES)
             if parent is None and dice.random() < ARRANGED:
-                found.append(self._source.arranged(number, dice))
+                proposed.append(self._source.arranged(number, dice))
             elif parent is None:
-                found.append(self._source.fresh(number))
+                proposed.append(self._source.fresh(number))
             else:
                 mate = kept[int(dice.integers(len(kept)))]
-                found.append(self._source.varied(parent, mate, dice))
-        return found
+                proposed.append(self._source.varied(parent, mate, dice))
+        return proposed
 
     def tell(self, number: int, genome: Genome, tried: Tried, known: bool) -> None:
         """Keep a trial for the targets to which it came near, and for the situations in it that are rare."""

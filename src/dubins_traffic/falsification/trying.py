@@ -187,8 +187,8 @@ class TrialRunner:
         """Run a trial that can't be stepped with others."""
         if self._remote is not None:
             record = self._remote.drive(instance)
-            found, passages = judged_record(record)
-            return _tried_alone(instance, found, record.ending, passages)
+            scored, passages = judged_record(record)
+            return _tried_alone(instance, scored, record.ending, passages)
         ego = EgoTrace()
         result = self._egos.alone(instance, sinks=[ego])
         self._note([result.wall.act_s])
@@ -262,9 +262,9 @@ def tried_of(
     return Tried(discarded, bool(fault), margins, cells, fault=fault)
 
 
-def _tried_alone(instance: Instance, found: Score, ending: Ending | None, passages: Passages) -> Tried:
+def _tried_alone(instance: Instance, scored: Score, ending: Ending | None, passages: Passages) -> Tried:
     """Return what came of a trial that was run alone."""
-    tried = tried_of(found, ending, passages, 0, instance)
+    tried = tried_of(scored, ending, passages, 0, instance)
     return with_passages([tried], passages, instance)[0]
 
 
@@ -283,8 +283,8 @@ def with_passages(tried: Sequence[Tried], passages: Passages, instance: Instance
 
 def in_order(parts: Iterable[Mapping[int, Tried]]) -> list[Tried]:
     """Return what came of trials in the order of their instances, of which `parts` have some each."""
-    found = {k: each for part in parts for k, each in part.items()}
-    return [found[k] for k in range(len(found))]
+    by_place = {k: each for part in parts for k, each in part.items()}
+    return [by_place[k] for k in range(len(by_place))]
 
 
 def broken_formulas(score: Score) -> dict[str, float]:
@@ -360,11 +360,11 @@ class PoolRunner:
 
     def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
         """Run the trials of instances, some at a time; a chunk whose worker ends is run again, a few times."""
-        for chunk, found in carry_out(self._workers, self._chunks(instances)):
-            if found is None:
+        for chunk, answer in carry_out(self._workers, self._chunks(instances)):
+            if answer is None:
                 raise WorkerLostError(f"workers end in the middle of trials: {self.name} may end its process")
-            tried: list[Tried] = found[0]
-            self._answer_s = found[1]
+            tried: list[Tried] = answer[0]
+            self._answer_s = answer[1]
             yield dict(enumerate(tried, chunk.first))
 
     def _chunks(self, instances: Sequence[Instance]) -> Iterator[TrialChunk]:

@@ -39,9 +39,9 @@ class Trees:
 @cache
 def trees() -> Trees:
     """Return where this process can make groups, and sweep what those have left who were killed."""
-    found = _first_version()
+    first = _first_version()
     second = _second_version()
-    best = second if len(second.folders) > len(found.folders) else found
+    best = second if len(second.folders) > len(first.folders) else first
     for folder in set(best.folders.values()):
         _sweep(folder)
     return best
@@ -122,7 +122,7 @@ OWN: Final = 4
 
 
 def _first_version() -> Trees:
-    found: dict[str, Path] = {}
+    folders: dict[str, Path] = {}
     for line in _lines("/proc/self/cgroup"):
         number, names, path = line.split(":", 2)
         if number == "0":
@@ -132,8 +132,8 @@ def _first_version() -> Trees:
             inside = root / path.lstrip("/")
             base = inside if inside.is_dir() else root
             if name in TREES and _can_make(base):
-                found[name] = base
-    return Trees(1, found)
+                folders[name] = base
+    return Trees(1, folders)
 
 
 def _second_version() -> Trees:

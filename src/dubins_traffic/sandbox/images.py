@@ -137,8 +137,8 @@ class _Podman:
         if NO_ROOM in done.stderr.lower():
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         if done.returncode:
-            said = done.stderr.decode(errors="replace").strip().splitlines() or ["it does not say why"]
-            raise InputError(shown(said[0], 200), field=f"podman {words[0]}", expected=_EXPECTED)
+            lines = done.stderr.decode(errors="replace").strip().splitlines() or ["it does not say why"]
+            raise InputError(shown(lines[0], 200), field=f"podman {words[0]}", expected=_EXPECTED)
         return done.stdout.decode(errors="replace").strip()
 
 
@@ -174,10 +174,10 @@ def _flattened(podman: Callable[..., str], archive: Path, target: Path) -> Mappi
     """Let podman read an image and write its files; return what is said of it."""
     try:
         podman("load", "--quiet", "--input", str(archive.resolve()))
-        found = set(podman("images", "--quiet", "--no-trunc").split())
-        if len(found) != 1:
-            raise InputError("not one image", value=len(found), expected=_EXPECTED)
-        image = found.pop()
+        images = set(podman("images", "--quiet", "--no-trunc").split())
+        if len(images) != 1:
+            raise InputError("not one image", value=len(images), expected=_EXPECTED)
+        image = images.pop()
         config = json.loads(podman("image", "inspect", image))[0]["Config"]
         container = podman("create", "--network=none", "--pull=never", image, "/none")
         podman("export", "--output", str(target), container)
@@ -190,8 +190,8 @@ def _flattened(podman: Callable[..., str], archive: Path, target: Path) -> Mappi
 
 def _described(config: Mapping[str, object]) -> Image:
     def words(name: str) -> Sequence[str]:
-        found = config.get(name)
-        return [str(word) for word in found] if isinstance(found, list) else []  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        value = config.get(name)
+        return [str(word) for word in value] if isinstance(value, list) else []  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
 
     pairs = (text.partition("=") for text in words("Env"))
     environment = {name: value for name, _, value in pairs if name.isidentifier() and name.isascii()}

@@ -62,12 +62,12 @@ class Layers:
 
     def missing(self) -> list[str]:
         """Return what can't be enforced here, as lines for people; a stranger's program is refused then."""
-        found: list[str] = []
+        reasons: list[str] = []
         if not self.boxes:
-            found.append(f"bubblewrap makes no boxes here: {self.why}")
+            reasons.append(f"bubblewrap makes no boxes here: {self.why}")
         if SECCOMP not in self:
-            found.append("no filter of system calls: libseccomp2 and pyseccomp are needed")
-        return found
+            reasons.append("no filter of system calls: libseccomp2 and pyseccomp are needed")
+        return reasons
 
     def require(self) -> None:
         """Refuse a machine on which a stranger's program can't be held.

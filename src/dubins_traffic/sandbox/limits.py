@@ -84,8 +84,8 @@ class Limits:
     def text(self) -> str:
         """Return what `from_text` reads: the limits that are not the usual ones."""
         usual = Limits()
-        told = ((each.name, getattr(self, each.name), getattr(usual, each.name)) for each in fields(self))
-        return ",".join(f"{name}={value!r}" for name, value, other in told if value != other)
+        triples = ((each.name, getattr(self, each.name), getattr(usual, each.name)) for each in fields(self))
+        return ",".join(f"{name}={value!r}" for name, value, other in triples if value != other)
 
 
 _UNITS: Final = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}

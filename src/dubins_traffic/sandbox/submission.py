@@ -187,7 +187,7 @@ def interpreter() -> tuple[str, tuple[Shown, ...], tuple[str, ...]]:
 def _packages() -> list[Path]:
     """Return the folders with packages that this interpreter looks in, that of numpy among them."""
     numpys = Path(numpy.__file__).resolve().parents[1]
-    found = [
+    places = [
         Path(place).resolve() for place in sys.path if place.endswith(("site-packages", "dist-packages"))
     ]
-    return list(dict.fromkeys([numpys, *(place for place in found if place.is_dir())]))
+    return list(dict.fromkeys([numpys, *(place for place in places if place.is_dir())]))

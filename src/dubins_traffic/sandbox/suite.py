@@ -111,12 +111,12 @@ class Baits:
 
     def daemons(self) -> list[int]:
         """Return the processes that an attack has left behind on the host."""
-        found: list[int] = []
+        processes: list[int] = []
         for folder in Path("/proc").iterdir():
             with contextlib.suppress(OSError):
                 if folder.name.isdigit() and self.daemon.encode() in (folder / "cmdline").read_bytes():
-                    found.append(int(folder.name))
-        return found
+                    processes.append(int(folder.name))
+        return processes
 
 
 LIMITS: Final = Limits(

@@ -142,15 +142,15 @@ def places(session: Session) -> Mapping[int, int]:
     many = Counter(row.team_id for row in rows)
     turns = {row.team_id: (row.turn, row.team_id) for row in rows}
     before: Counter[int] = Counter()
-    found: dict[int, int] = {}
+    places_ahead: dict[int, int] = {}
     for submission_id, team_id, _ in rows:
         ahead = before[team_id]
         before[team_id] += 1
-        if submission_id not in found:
+        if submission_id not in places_ahead:
             others = sum(
                 min(many[other], ahead + (turns[other] < turns[team_id]))
                 for other in many
                 if other != team_id
             )
-            found[submission_id] = ahead + others + 1
-    return found
+            places_ahead[submission_id] = ahead + others + 1
+    return places_ahead

@@ -46,10 +46,10 @@ def counting(session: Session, phase: Phase) -> Mapping[int, Submission]:
         Submission.phase_id == phase.id, Submission.disqualified == ""
     )
     ended = submissions_of_phase.where(Submission.state.in_(["done", "scoring"]))
-    found: dict[int, Submission] = {}
+    counted: dict[int, Submission] = {}
     for submission in session.scalars(ended.order_by(Submission.named, Submission.received, Submission.id)):
-        found[submission.team_id] = submission
-    return found
+        counted[submission.team_id] = submission
+    return counted
 
 
 def refresh(service: Service) -> None:
@@ -117,8 +117,8 @@ def table(session: Session, row: Phase, phase: Loaded, hiding: Hiding) -> list[d
 def latest_standing(session: Session, phase: Phase, hiding: Hiding) -> Standing | None:
     """Return the newest table of a phase, if there is one."""
     query = select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id.desc()).limit(1)
-    found = session.scalars(query).first()
-    return None if found is None else hiding.shown(found)
+    standing = session.scalars(query).first()
+    return None if standing is None else hiding.shown(standing)
 
 
 def history(session: Session, phase: Phase, hiding: Hiding) -> Sequence[Standing]:

@@ -241,8 +241,8 @@ def record(
         for result in results:
             named = {name: result[name] for name in ("number", "replay", "own_replay")}
             trial = Trial(submission_id=submission.id, run=chunk.run, **named)
-            told = {name: result[name] for name in ("row", "end", "owner", "frames", "ran")}
-            hiding.keep(trial, told, result["log"])
+            result_row = {name: result[name] for name in ("row", "end", "owner", "frames", "ran")}
+            hiding.keep(trial, result_row, result["log"])
             session.add(trial)
     chunk.numbers = numbers
     queue.finish(session, chunk)

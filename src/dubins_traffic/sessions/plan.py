@@ -261,7 +261,7 @@ def session_plan(
         If an argument or the source is wrong; nothing has been written then.
     """
     check_choice(records, data, overwrite=overwrite, append=append)
-    found = load_runnable(source, rnd=rnd, seed=seed or 0)
+    runnable = load_runnable(source, rnd=rnd, seed=seed or 0)
     if controller is not None:
         controller = controllers.shielded(controller) if shield else controller
         controllers.load(controller)
@@ -269,9 +269,9 @@ def session_plan(
         raise InputError(
             "not a number of trials", file="--trials", value=trials, expected="at least 1, or --endless"
         )
-    supply = _supply(found, seed or 0)
+    supply = _supply(runnable, seed or 0)
     hand_over(supply(0), remote)
-    configuration = found if isinstance(found, Configuration) else None
+    configuration = runnable if isinstance(runnable, Configuration) else None
     if data is not None and configuration is None:
         raise InputError(
             "is for configurations", file="-f", value=os.fspath(data), expected="none of it here"
@@ -314,9 +314,9 @@ def moved_by(supply: Callable[[int], Instance], simulator: str, number: int) -> 
     return replace(supply(number), simulator=simulator)
 
 
-def _supply(found: Configuration | Instance | Record, seed: int) -> Callable[[int], Instance]:
-    if isinstance(found, Configuration):
-        configuration = found
+def _supply(runnable: Configuration | Instance | Record, seed: int) -> Callable[[int], Instance]:
+    if isinstance(runnable, Configuration):
+        configuration = runnable
         return lambda number: draw(configuration, seed, number)
-    instance = found.instance if isinstance(found, Record) else found
+    instance = runnable.instance if isinstance(runnable, Record) else runnable
     return lambda _number: instance

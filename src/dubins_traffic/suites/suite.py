@@ -131,12 +131,12 @@ class Suite:
     @property
     def hash(self) -> str:
         """SHA-256 of all that determines problems and scores: without its title and the page's controllers."""
-        told = {name: value for name, value in self.document.items() if name not in _TOLD}
-        if "campaign" in told:
-            told["campaign"] = {
-                name: value for name, value in told["campaign"].items() if name != "controllers"
+        decides = {name: value for name, value in self.document.items() if name not in _TOLD}
+        if "campaign" in decides:
+            decides["campaign"] = {
+                name: value for name, value in decides["campaign"].items() if name != "controllers"
             }
-        return hashlib.sha256(json.dumps(told, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+        return hashlib.sha256(json.dumps(decides, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
     @property
     def label(self) -> str:
@@ -188,8 +188,8 @@ class Suite:
 
 def shipped_suites() -> list[str]:
     """Return the names of the suites that are shipped."""
-    found = (item.name for item in (files("dubins_traffic.suites") / "data").iterdir())
-    return sorted(name.removesuffix(".json") for name in found if name.endswith(".json"))
+    items = (item.name for item in (files("dubins_traffic.suites") / "data").iterdir())
+    return sorted(name.removesuffix(".json") for name in items if name.endswith(".json"))
 
 
 def load_suite(name: str | os.PathLike[str]) -> Suite:

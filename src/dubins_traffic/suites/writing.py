@@ -41,10 +41,10 @@ Columns = Mapping[str, Sequence[Any]]
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """The answers of one solver: `found` and `seconds`, by the names of the games."""
+    """The answers of one solver: `results` and `seconds`, by the names of the games."""
 
     name: str
-    found: Mapping[str, GameResult]
+    results: Mapping[str, GameResult]
     seconds: Mapping[str, float]
 
 
@@ -53,12 +53,17 @@ def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
 
     InputError as `compare_trials`, `columns_of` and `answers_of`.
     """
-    told = [line for line in (where_they_ran(sources), made_by(sources)) if line]
-    how = " ".join(told)
-    note = "".join(f"\n{line}\n" for line in (*shares(sources), *told))
+    how_lines = [line for line in (where_they_ran(sources), made_by(sources)) if line]
+    how = " ".join(how_lines)
+    note = "".join(f"\n{line}\n" for line in (*shares(sources), *how_lines))
     if suite.model.cases is not None:
-        found = columns_of(suite, sources)
-        head, body, summary, made = ["case", *found], _case_lines(suite, found), "", {"hash": suite.hash}
+        columns_by_name = columns_of(suite, sources)
+        head, body, summary, made = (
+            ["case", *columns_by_name],
+            _case_lines(suite, columns_by_name),
+            "",
+            {"hash": suite.hash},
+        )
     elif suite.model.games is not None:
         answers = answers_of(suite, sources)
         head, body, summary = _game_columns(answers), _game_lines(suite, answers), _summary(suite, answers)
@@ -81,8 +86,8 @@ def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
         made=made,
         how=how,
     )
-    told = f"# {suite.name}\n\n{suite.model.title}. Hash `{suite.hash}`.\n\n{markdown_table(head, body)}"
-    return {TABLE: told + (f"\n{summary}\n" if summary else "") + note, PAGE: whole}
+    text = f"# {suite.name}\n\n{suite.model.title}. Hash `{suite.hash}`.\n\n{markdown_table(head, body)}"
+    return {TABLE: text + (f"\n{summary}\n" if summary else "") + note, PAGE: whole}
 
 
 def write_results(suite: Suite, sources: Sequence[Source], folder: Path, *, overwrite: bool = False) -> str:
@@ -91,13 +96,13 @@ def write_results(suite: Suite, sources: Sequence[Source], folder: Path, *, over
     Files that are there are replaced only if `overwrite` is given. InputError as `results`, if a path is refused
     (`files.require_output`), or if a file can't be written.
     """
-    found = results(suite, sources)
+    texts = results(suite, sources)
     make_folder(folder, "results")
-    for name in found:
+    for name in texts:
         require_output(folder / name, "results", [Path(name).suffix], overwrite=overwrite)
-    for name, text in found.items():
+    for name, text in texts.items():
         write_text(folder / name, text)
-    return found[TABLE]
+    return texts[TABLE]
 
 
 def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
@@ -154,8 +159,8 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
     ]
     count = comparison.campaign.cells[0].count
     fewer = "" if count == suite.trials else f", {count} of {suite.trials} trials of each combination"
-    told = f"# {suite.name}{fewer}\n\n{suite.model.title}. Hash `{suite.hash}`."
-    return f"{told}\n\n{markdown_table(head, body)}\n{NOTE}\n"
+    heading = f"# {suite.name}{fewer}\n\n{suite.model.title}. Hash `{suite.hash}`."
+    return f"{heading}\n\n{markdown_table(head, body)}\n{NOTE}\n"
 
 
 def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
@@ -165,7 +170,7 @@ def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
     """
     check_suite(suite, sources)
     count = len(suite.model.cases or ())
-    found: dict[str, Columns] = {}
+    columns_by_name: dict[str, Columns] = {}
     for one in named_entries(sources):
         columns = one.entry.columns
         for name in ("end", "verdict", "clean", "breaches"):
@@ -176,31 +181,34 @@ def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
                     field=f"{one.entry.controller}.columns.{name}",
                     expected=f"{count} values",
                 )
-        found[one.name] = columns
-    return found
+        columns_by_name[one.name] = columns
+    return columns_by_name
 
 
 def answers_of(suite: Suite, sources: Sequence[Source]) -> list[Answers]:
     """Return the answers in files of results; InputError if the suite is another one here, or a name stands twice."""
     check_suite(suite, sources)
-    found: list[Answers] = []
+    answers: list[Answers] = []
     for source in sources:
-        for entry in source.found.solvers:
-            name = entry_name(source, entry.solver, len(source.found.solvers))
-            if any(name == other.name for other in found):
+        for entry in source.results.solvers:
+            name = entry_name(source, entry.solver, len(source.results.solvers))
+            if any(name == other.name for other in answers):
                 raise InputError(
                     "name taken", file=str(source.path), value=name, expected="NAME=PATH with another name"
                 )
             seconds = {} if source.wall is None else source.wall.solvers.get(entry.solver, {})
-            found.append(Answers(name, entry.games, seconds))
-    return found
+            answers.append(Answers(name, entry.games, seconds))
+    return answers
 
 
-def _case_lines(suite: Suite, found: Mapping[str, Columns]) -> list[list[str]]:
+def _case_lines(suite: Suite, columns_by_name: Mapping[str, Columns]) -> list[list[str]]:
     cases = suite.model.cases or ()
-    rows = [[case.name, *(_said(columns, k) for columns in found.values())] for k, case in enumerate(cases)]
-    ended = ["ended by the controller", *(str(_ended(columns)) for columns in found.values())]
-    return [*rows, ["clean", *(_clean(columns) for columns in found.values())], ended]
+    rows = [
+        [case.name, *(_said(columns, k) for columns in columns_by_name.values())]
+        for k, case in enumerate(cases)
+    ]
+    ended = ["ended by the controller", *(str(_ended(columns)) for columns in columns_by_name.values())]
+    return [*rows, ["clean", *(_clean(columns) for columns in columns_by_name.values())], ended]
 
 
 def _said(columns: Columns, case: int) -> str:
@@ -249,8 +257,8 @@ def _realizable(game: GameEntry) -> str:
 
 
 def _verdict_and_seconds(game: GameEntry, solver: Answers) -> tuple[str, str]:
-    found = solver.found.get(game.name)
-    right = None if found is None else agrees(game, found)
+    answer = solver.results.get(game.name)
+    right = None if answer is None else agrees(game, answer)
     return RIGHT[right], shown(solver.seconds.get(game.name))
 
 
@@ -267,8 +275,8 @@ def _summary(suite: Suite, answers: Sequence[Answers]) -> str:
 
 def _over_all(standing: Standing, name: str) -> float:
     """Return the mean of a column over all trials; one that came to nothing counts 0, so no crash hides a trial."""
-    found = standing.estimates[name]
-    return (found.mean or 0.0) * found.count / max(1, standing.trials)
+    estimate = standing.estimates[name]
+    return (estimate.mean or 0.0) * estimate.count / max(1, standing.trials)
 
 
 def _sum(estimate: Estimate) -> float | None:

@@ -88,9 +88,9 @@ def smallest(
     for count in range(1, parts + 1):
         ladders = strengthenings(board.assumption, count, bends=bends)
         tried = (next(filter(wins, steps), None) for steps in ladders)
-        found = [assumption for assumption in tried if assumption is not None]
-        if found:
-            return found
+        winning = [assumption for assumption in tried if assumption is not None]
+        if winning:
+            return winning
     return []
 
 
@@ -159,27 +159,27 @@ class Answer:
             "elsewhere": "from some positions, but not where the instance starts",
             "nowhere": "nowhere",
         }[self.outcome]
-        found = [
+        lines_of_text = [
             f"{_e_agents(board.others)}, {board.arena.cells} cells, crossings from degree "
             f"{board.arena.order_degree} on; assumed: {board.assumption}",
             f"{game.positions:,} positions, {game.moves:,} moves of the environment",
             f"The ego wins {where}.",
         ]
         if self.realizable == VACUOUSLY:
-            found.append(
+            lines_of_text.append(
                 "It wins vacuously: each of these wins rests on an assumption that can't be kept then."
             )
         vacuous = int(self.solution.vacuous.sum())
         if vacuous:
-            found.append(
+            lines_of_text.append(
                 f"Warning: in {vacuous:,} positions it wins only by bringing the e-agents to where they can't keep "
                 "their assumption. The strategy never does so, and gives these positions up."
             )
         if self.route_bound > 0:
-            found.append(
+            lines_of_text.append(
                 f"On shortest routes it is proved to win against up to {_e_agents(self.route_bound)}."
             )
-        return found
+        return lines_of_text
 
     def explain(self, progress: Progress | None = None) -> list[str]:
         """Return why the ego wins, or how it is stopped and what to assume so that it is not.

@@ -89,10 +89,10 @@ class Arena:
     @cached_property
     def lane_end(self) -> tuple[tuple[int, int], ...]:
         """Node and slot in which each lane ends."""
-        found = {
+        ends = {
             lane: (n, slot) for n, node in enumerate(self.nodes) for slot, lane in enumerate(node.inbound)
         }
-        return tuple(found[lane] for lane in range(self.network.lanes))
+        return tuple(ends[lane] for lane in range(self.network.lanes))
 
     def nodes_of(self, vertex: int) -> tuple[int, ...]:
         """Return the nodes in an intersection."""

@@ -77,7 +77,7 @@ class Assumption:
 
         InputError if a word is none of ours or a part is named twice.
         """
-        found = NOTHING
+        assumption = NOTHING
         seen: set[str] = set()
         for word in words:
             name = _NAMES.get(word.strip().lower())
@@ -87,8 +87,8 @@ class Assumption:
             if part in seen:
                 raise InputError("assumed twice", field="--assume", value=part, expected="each part once")
             seen.add(part)
-            found = replace(found, **WORDS[name])
-        return found
+            assumption = replace(assumption, **WORDS[name])
+        return assumption
 
     def words(self) -> tuple[str, ...]:
         """Return the words that `parse` understands as this assumption."""

@@ -223,26 +223,28 @@ class Board:
 
     def _settings(self) -> Rows[Settings]:
         """Return `Tables.settings`."""
-        found, assumption = table(Settings, 1), self.assumption
-        row = found[0]
+        settings, assumption = table(Settings, 1), self.assumption
+        row = settings[0]
         row.others, row.positions, row.cells = self.others, self.positions, self.arena.cells
         row.yields, row.frees = assumption.yields, assumption.frees
         row.leaves, row.unmet = assumption.leaves is not Leaving.NEVER, assumption.leaves is Leaving.UNMET
         row.moves_up = assumption.arrives is Arriving.MOVES_UP
-        return found
+        return settings
 
     def _changes(self) -> dict[str, Ints]:
         """Return the tables of the scenes of all kinds, padded to four slots."""
-        found: dict[str, list[Ints]] = {}
+        tables_of_kinds: dict[str, list[Ints]] = {}
         for of_kind in self.sceneries.values():
             pad = SLOTS - of_kind.kind.slots
             described = of_kind.described() | {"left": of_kind.left(), "ego_entered": of_kind.ego_entered()}
             for name, row in described.items():
-                found.setdefault(name, []).append(row)
+                tables_of_kinds.setdefault(name, []).append(row)
             for name, changed in (("entered", of_kind.entered()), ("removed", of_kind.removed())):
-                found.setdefault(name, []).append(_wider(changed, ((0, 0), (0, pad))))
-            found.setdefault("arrived", []).append(_wider(of_kind.arrived(), ((0, 0), (0, pad), (0, 0))))
-        return {name: np.concatenate(parts) for name, parts in found.items()}
+                tables_of_kinds.setdefault(name, []).append(_wider(changed, ((0, 0), (0, pad))))
+            tables_of_kinds.setdefault("arrived", []).append(
+                _wider(of_kind.arrived(), ((0, 0), (0, pad), (0, 0)))
+            )
+        return {name: np.concatenate(parts) for name, parts in tables_of_kinds.items()}
 
     def _goal_of(self, vertex: int) -> int:
         return self.arena.goals.index(vertex) if vertex in self.arena.goals else -1
@@ -267,16 +269,16 @@ class Board:
     def scenes(self, position: int) -> list[Scene]:
         """Return the scene of every node in a position."""
         left, ego, rest = self.others, 1, position
-        found: list[Scene] = []
+        scenes_of_nodes: list[Scene] = []
         for n in range(len(self.arena.nodes)):
             at_node = self.scenery(n).scenes
             start = int(self.tables.offset_at[n]) + (left * 2 + ego) * len(at_node)
             row = self.tables.offset[start : start + len(at_node)]
             number = int(np.searchsorted(row, rest, side="right")) - 1
             rest -= int(row[number])
-            found.append(at_node[number])
+            scenes_of_nodes.append(at_node[number])
             left, ego = left - at_node[number].others, ego - at_node[number].egos
-        return found
+        return scenes_of_nodes
 
 
 def _ints(values: Iterable[int]) -> Ints:

@@ -336,10 +336,10 @@ WHO_NAMES: Final = ("e-agent", "ego", "e-agent that has forfeited")
 
 def scene_numbers(board: Board) -> Numbers:
     """Return the scene (N, V) of each node in each position, numbered as in the header."""
-    found = np.empty((board.positions, len(board.arena.nodes)), dtype=np.int32)
+    numbers = np.empty((board.positions, len(board.arena.nodes)), dtype=np.int32)
     room = np.empty(len(board.arena.nodes), dtype=np.int64)
-    list_scenes(board.tables, room, found)
-    return found
+    list_scenes(board.tables, room, numbers)
+    return numbers
 
 
 def header(board: Board) -> dict[str, Any]:

@@ -105,7 +105,7 @@ class Scene:
 
 def scenes(kind: Kind, others: int) -> list[Scene]:
     """Return all scenes of a kind with at most so many e-agents, the empty one first."""
-    found: list[Scene] = []
+    possible: list[Scene] = []
     whos = (WHO.OTHER, WHO.EGO, WHO.RENEWED) if kind.forfeits is Forfeits.ONCE else (WHO.OTHER, WHO.EGO)
     for count in range(min(kind.slots, others + 1) + 1):
         for taken in (permutations if kind.ordered else combinations)(range(kind.slots), count):
@@ -116,8 +116,8 @@ def scenes(kind: Kind, others: int) -> list[Scene]:
                         for inside in (None, WHO.OTHER, WHO.EGO):
                             scene = Scene(inside, tuple(zip(taken, queue, strict=True)), parked)
                             if scene.egos <= 1 and scene.others <= others:
-                                found.append(scene)
-    return found
+                                possible.append(scene)
+    return possible
 
 
 @dataclass(frozen=True)
@@ -134,9 +134,9 @@ class Scenery:
         """The number of each scene."""
         return {scene: number for number, scene in enumerate(self.scenes)}
 
-    def _numbers(self, found: list[Scene | None]) -> Ints:
+    def _numbers(self, changed: list[Scene | None]) -> Ints:
         return np.array(
-            [IMPOSSIBLE if scene is None else self.number.get(scene, IMPOSSIBLE) for scene in found],
+            [IMPOSSIBLE if scene is None else self.number.get(scene, IMPOSSIBLE) for scene in changed],
             dtype=np.int64,
         )
 
@@ -215,13 +215,13 @@ class Scenery:
 
     def ego_entered(self) -> Ints:
         """Return the scene (C,) after the ego has entered from its lane."""
-        found: list[Scene | None] = []
+        entered: list[Scene | None] = []
         for scene in self.scenes:
             places = [place for place, (_, who) in enumerate(scene.queue) if who == WHO.EGO]
             may = scene.inside is None and bool(places) and (places[0] == 0 or not self.kind.ordered)
             slot = scene.queue[places[0]][0] if may else 0
-            found.append(replace(scene.without(slot), inside=WHO.EGO) if may else None)
-        return self._numbers(found)
+            entered.append(replace(scene.without(slot), inside=WHO.EGO) if may else None)
+        return self._numbers(entered)
 
     def arrived(self) -> Ints:
         """Return the scene (C, slots, 4) after each of `WHO` has come into a slot."""

@@ -306,8 +306,8 @@ class RoadPlay:
         if car in self._seen:
             return self.ground.nearest_free(start, taken, avoided)
         open_to_view = {other for other in range(self._board.arena.cells) if self._would_be_seen(other)}
-        found = self.ground.nearest_free(start, taken | open_to_view, avoided)
-        return found if found != NOWHERE else self.ground.nearest_free(start, taken, avoided)
+        free_cell = self.ground.nearest_free(start, taken | open_to_view, avoided)
+        return free_cell if free_cell != NOWHERE else self.ground.nearest_free(start, taken, avoided)
 
     def _put(self, car: int, cell: int) -> None:
         """Move a car, out of the queue it is in and last into the one it comes to."""

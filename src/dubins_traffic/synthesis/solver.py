@@ -89,7 +89,7 @@ def graph(game: Game) -> Graph:
     out = room(game.board, 0, 0)
     if not game.lean:
         out = out._replace(to=game.to, moved=game.moved)
-    found = Graph(
+    whole = Graph(
         game.lean,
         game.board.tables,
         Work.of(game.board),
@@ -106,7 +106,7 @@ def graph(game: Game) -> Graph:
         game.owed_mask,
         owner,
     )
-    return for_thread(game, found)
+    return for_thread(game, whole)
 
 
 def for_thread(game: Game, shared: Graph) -> Graph:
@@ -152,9 +152,9 @@ class _Solver:
         spoiled = False
         while True:
             targets = self._targets(won)
-            found = self._searched(targets, friendly)
-            spoiled = spoiled or any(way.unfriendly for way in found)
-            ways = [way.ranks.rank != UNRANKED for way in found]
+            ranked_goals = self._searched(targets, friendly)
+            spoiled = spoiled or any(way.unfriendly for way in ranked_goals)
+            ways = [way.ranks.rank != UNRANKED for way in ranked_goals]
             before = won
             for goal in goals:
                 lost = won & ~ways[goal]
@@ -162,7 +162,7 @@ class _Solver:
                     losses.append(Loss(goal, targets[goal], lost))
                 won = won & ways[goal]
             if won.sum() in (before.sum(), 0):
-                return won, tuple(_within(way.ranks, won) for way in found), tuple(losses), spoiled
+                return won, tuple(_within(way.ranks, won) for way in ranked_goals), tuple(losses), spoiled
 
     def _targets(self, won: Flags) -> list[Flags]:
         """Return, for each goal, where it has been reached and the ego stays where it has won."""
@@ -178,10 +178,10 @@ class _Solver:
         """Return the ways to all goals: side by side, or for the sake of memory one after the other."""
         if not self._game.lean:
             return self._side_by_side(targets, friendly, "solve")
-        found: list[_Ranked] = []
+        ranked: list[_Ranked] = []
         for k, target in enumerate(targets):
-            found += self._side_by_side([target], friendly, f"solve, goal {k + 1} of {len(targets)}")
-        return found
+            ranked += self._side_by_side([target], friendly, f"solve, goal {k + 1} of {len(targets)}")
+        return ranked
 
     def _side_by_side(self, targets: list[Flags], friendly: bool, what: str) -> list[_Ranked]:
         """Return the ways to these targets; interrupted by Ctrl-C."""

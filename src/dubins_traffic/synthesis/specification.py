@@ -110,8 +110,8 @@ def specification(board: Board, starts: Sequence[int]) -> Specification:
         "E3": assumed.forfeits is Forfeits.NEVER,
         "E5": assumed.arrives is not Arriving.NEVER,
     }
-    for part, said in wanted.items():
-        if not said:
+    for part, is_sayable in wanted.items():
+        if not is_sayable:
             raise InputError(
                 f"a game without {part}, or with a weaker form, has no specification",
                 field="assume",
@@ -221,9 +221,9 @@ class _Writer:
         )
 
     def _before(self, i: int, j: int, *, later: bool = False) -> Formula:
-        found = prop(order_name(min(i, j), max(i, j)))
-        found = next_(found) if later else found
-        return found if i < j else negation(found)
+        bit = prop(order_name(min(i, j), max(i, j)))
+        bit = next_(bit) if later else bit
+        return bit if i < j else negation(bit)
 
     def _first(self, i: int) -> Formula:
         """Say that nobody waits at the same crossing before a car."""
@@ -349,5 +349,5 @@ class _Writer:
 
 def _simple(parts: Iterable[Formula]) -> tuple[Formula, ...]:
     """Return parts without constants, and without those that are always true."""
-    found = (simplify(part) for part in parts)
-    return tuple(part for part in found if part.op is not Op.TRUE)
+    simplified = (simplify(part) for part in parts)
+    return tuple(part for part in simplified if part.op is not Op.TRUE)

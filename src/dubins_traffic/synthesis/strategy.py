@@ -110,11 +110,11 @@ class Strategy:
         """
         with Archive(path, "strategy") as archive:
             try:
-                found = _strategy(archive)
-                found.first()
+                strategy = _strategy(archive)
+                strategy.first()
             except InputError as error:
                 raise error if error.file else error.within(file=str(path)) from None
-        return found
+        return strategy
 
 
 class _Header(BaseModel):

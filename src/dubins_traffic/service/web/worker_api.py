@@ -99,10 +99,10 @@ class WorkerApi(Controller):
     @post("/lease", sync_to_thread=True, status_code=HTTP_200_OK)
     def lease(self, service: ServiceHere, data: JSONBody[AskedFor]) -> Response[Leased | None]:
         """Lease the next chunk; nothing if none waits."""
-        found = service.database.patiently(lambda session: _lease(service, session, data.name))
-        if found is None:
+        leased = service.database.patiently(lambda session: _lease(service, session, data.name))
+        if leased is None:
             return Response(None, status_code=HTTP_204_NO_CONTENT)
-        return Response(found)
+        return Response(leased)
 
     @get("/submissions/{digest:str}", sync_to_thread=True)
     def submission(self, service: ServiceHere, digest: Digest) -> Response[bytes]:
@@ -175,9 +175,9 @@ def _keep_replay(service: Service, number: int, data: bytes) -> str:
     return service.storage.put(kept, "replays")
 
 
-def _note(chunk: Chunk, told: str) -> str:
+def _note(chunk: Chunk, why: str) -> str:
     """Return why a lease ended without a result; a phase that does not show all keeps nothing of what a worker saw."""
-    return told if chunk.submission.phase.shows == "all" else f"the log of worker {chunk.worker} says why"
+    return why if chunk.submission.phase.shows == "all" else f"the log of worker {chunk.worker} says why"
 
 
 def _lease(service: Service, session: Session, name: str) -> Leased | None:
@@ -222,11 +222,11 @@ def _done(service: Service, session: Session, number: int, report: Report) -> No
 
 
 def _seen(session: Session, name: str, at: float, busy: str) -> None:
-    found = session.scalars(select(Worker).where(Worker.name == name)).first()
-    if found is None:
-        found = Worker(name=name)
-        session.add(found)
-    found.seen, found.busy = at, busy
+    row = session.scalars(select(Worker).where(Worker.name == name)).first()
+    if row is None:
+        row = Worker(name=name)
+        session.add(row)
+    row.seen, row.busy = at, busy
 
 
 def _busy(chunk: Chunk) -> str:

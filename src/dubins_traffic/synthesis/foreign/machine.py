@@ -91,7 +91,7 @@ class Explicit:
         return None
 
 
-def damaged(what: str, problem: str, *, line: int | None = None, **found: Any) -> InputError:
+def damaged(what: str, problem: str, *, line: int | None = None, **values: Any) -> InputError:
     """Return the error for a file of a strategy that is not as its format says; `value` is what was found there."""
     where = None if line is None else f"line {line}"
-    return InputError(problem, field=where, expected=f"a strategy in {what}", **found)
+    return InputError(problem, field=where, expected=f"a strategy in {what}", **values)
