@@ -34,6 +34,8 @@ SIZES = ((1280, 800), (400, 800))
 SHARE = 0.9
 """Of the pictures of an empty canvas, those of a town at least."""
 LOOK_S = 4
+PACE = 0.5
+"""Seconds of the trial in a second for the scripted driver: keys come late on a busy machine."""
 EMPTY = """
 const [seconds, done] = arguments;
 document.body.innerHTML = '<canvas style="position:fixed;inset:0"></canvas>';
@@ -240,7 +242,7 @@ def test_a_page_that_is_loaded_again_goes_on_and_one_that_is_closed_ends_it(
 def test_a_scripted_driver_makes_a_clean_lap_by_key_presses_alone(
     browser: webdriver.Chrome, tmp_path: Path
 ) -> None:
-    instance = replace(draw(load_config("junction"), 0, 0), duration=75.0)
+    instance = replace(draw(load_config("junction"), 0, 0), duration=70.0)
     laps: list[int] = []
     for attempt in range(3):  # on a busy machine a key may come late
         result, standings = driven(browser, instance, tmp_path / f"{attempt}.mcap")
@@ -258,7 +260,7 @@ def test_a_scripted_driver_makes_a_clean_lap_by_key_presses_alone(
 def driven(browser: webdriver.Chrome, instance: Any, record: Path) -> tuple[Result, list[Standing]]:
     """Play a trial in this process, so that the driver sees what the ego does; what he does are keys in the browser."""
     told: list[str] = []
-    with Stage(told.append, opens=False, plays=True) as stage:
+    with Stage(told.append, opens=False, pace=PACE, plays=True) as stage:
         eyes: Any = Eyes(stage.feed)
         stage.feed = eyes
         driver = KeyDriver(browser, eyes, instance)
