@@ -107,7 +107,7 @@ def delay() -> int:
             )
             session.add(phase)
             for k in range(2):
-                team = accounts.found_team(session, f"t{k}", 0.0)
+                team = accounts.make_team(session, f"t{k}", 0.0)
                 account = Account(name=f"a{k}", password="", role="participant", team=team, created=0.0)
                 session.add(account)
                 session.flush()

@@ -49,7 +49,7 @@ def furnished(session: Session, teams: int = 3, shows: str = "all") -> tuple[Pha
     session.add(phase)
     people: list[Account] = []
     for number in range(teams):
-        team = accounts.found_team(session, f"t{number}", 1.0)
+        team = accounts.make_team(session, f"t{number}", 1.0)
         person = Account(name=f"a{number}", password="none", role="participant", team=team, created=1.0)
         session.add(person)
         people.append(person)

@@ -28,7 +28,7 @@ def phase_with(session: Session, *states: str) -> tuple[Phase, list[Submission]]
     """Add a closed test phase, and submissions of one team in these states, each with two trials."""
     competition = Competition(slug="c", title="C", document="{}", created=0.0)
     phase = Phase(name="test", shows="nothing", opens=0.0, closes=4000.0, competition=competition)
-    team = accounts.found_team(session, "t", 0.0)
+    team = accounts.make_team(session, "t", 0.0)
     account = Account(name="a", password="none", role="participant", team=team, created=0.0)
     session.add_all([phase, account])
     session.flush()

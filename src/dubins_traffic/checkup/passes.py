@@ -84,8 +84,6 @@ class Witness:
 
     Parameters
     ----------
-    controller : Controller
-        Who is asked.
     mark : callable
         Is told the time to begin (seconds) once the controller has started, and the tick before each answer.
     """
@@ -118,15 +116,7 @@ class Witness:
 
 
 def run_here(controller: str, number: int) -> Pass:
-    """Run the course in a process of its own, with hashes of strings that differ from pass to pass.
-
-    Parameters
-    ----------
-    controller : str
-        As for `run_trial`.
-    number : int
-        Of the pass.
-    """
+    """Run the course in a process of its own, with hashes of strings that differ from pass to pass."""
     with TemporaryDirectory() as folder:
         out, place = Path(folder) / "drives", Path(folder) / "place"
         out.touch()

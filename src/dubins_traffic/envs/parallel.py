@@ -19,7 +19,7 @@ from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import Pay
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.observations.flat import SHOWN
+from dubins_traffic.learning.flat import SHOWN
 from dubins_traffic.problem.kinds import KEEP_RULES
 from dubins_traffic.protocols import End
 from dubins_traffic.shield.tables import Overtakes, check_overtakes
@@ -27,10 +27,10 @@ from dubins_traffic.shield.tables import Overtakes, check_overtakes
 if TYPE_CHECKING:
     import os
 
+    from dubins_traffic.animation.raster_kernel import Image
     from dubins_traffic.envs.episodes import Levels
     from dubins_traffic.problem.configuration import Configuration
     from dubins_traffic.problem.instance import Instance
-    from dubins_traffic.viewer.raster_kernel import Image
 
 Flags = dict[str, bool]
 
@@ -120,7 +120,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         self._episode = 0
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
-        """Return the space of an agent's observations: `observations.flat`, then `envs.about_ego.NAMES`."""
+        """Return the space of an agent's observations: `learning.flat`, then `envs.about_ego.NAMES`."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:
@@ -217,18 +217,18 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         """The commands of all cars in each tick of this episode so far, (K, N, 2), m/s and rad/s."""
         given = self._begun().given
         cars = len(self._cars)  # the tables of a batch may have more places than the trial has cars
-        return np.array([own[0, :cars] for own in given]).reshape(len(given), cars, 2)
+        return np.array([of_cars[0, :cars] for of_cars in given]).reshape(len(given), cars, 2)
 
     def _paid(self, crew: Crew, name: str) -> tuple[float, dict[str, Any]]:
         car = self._ids.index(name)
-        reward, told = self._pay.of(crew.terms[0], crew.broken[0], car)
+        reward, info = self._pay.of(crew.terms[0], crew.broken[0], car)
         first = crew.blame[0].first
-        told["broke_first"] = None if first is None else self._ids[first]
+        info["broke_first"] = None if first is None else self._ids[first]
         if car in self._cast.shields:
-            told["interventions"] = int(crew.stepped_in[0, car])
+            info["interventions"] = int(crew.stepped_in[0, car])
         if crew.group.endings[0] is not None:
-            told["trial"] = crew.group.instances[0]
-        return reward, told
+            info["trial"] = crew.group.instances[0]
+        return reward, info
 
     def _observed(self) -> dict[str, Any]:
         whole = self._begun().observed[0]
@@ -262,10 +262,10 @@ def _numbers(sample: Instance, learned: Sequence[str] | None, *, with_ego: bool)
     for name in learned or ():
         if name not in names[1:]:
             raise _no_agent("learned", name, names[1:])
-    found = [EGO] if with_ego else []
+    cars = [EGO] if with_ego else []
     for car, agent in enumerate(sample.e_agents, start=1):
         if learned is None or agent.name in learned:
-            found.append(car)
+            cars.append(car)
         elif agent.kind not in KEEP_RULES:
             raise InputError(
                 "an e-agent beside learners",
@@ -273,9 +273,9 @@ def _numbers(sample: Instance, learned: Sequence[str] | None, *, with_ego: bool)
                 value=agent.kind,
                 expected=", ".join(sorted(KEEP_RULES)),
             )
-    if not found:
+    if not cars:
         raise InputError("nobody learns", field="learned", value=learned, expected="at least one car")
-    return found
+    return cars
 
 
 def _no_agent(field: str, name: str, known: Sequence[str]) -> InputError:

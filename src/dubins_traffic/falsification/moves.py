@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from dubins_traffic.agents import choices, whims
+from dubins_traffic.agents import choices
 from dubins_traffic.agents.choices import CHOICE
 from dubins_traffic.cars.state import EGO, Pose
+from dubins_traffic.falsification import whims
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.starts import Ground, areas_of, gap_radius
 
@@ -24,27 +25,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Genome:
-    """What an instance of a search is made of.
-
-    Attributes
-    ----------
-    base : int
-        Number of the trial of the configuration whose network, goals and cars it has.
-    root : int
-        Number of the trial of the search that was drawn and from which this one descends.
-    starts : mapping of int to Pose
-        Other starts of some of its cars, by the cars' numbers.
-    tables : mapping of int to (K, 7) float64
-        What each e-agent chooses (`agents.choices`), by the cars' numbers.
-    whims : mapping of int to (K, 5) float64
-        What each free e-agent likes to do (`agents.whims`), by the cars' numbers.
-    """
+    """What an instance of a search is made of."""
 
     base: int
+    """Number of the trial of the configuration whose network, goals and cars it has."""
     root: int
+    """Number of the trial of the search that was drawn and from which this one descends."""
     starts: Mapping[int, Pose] = field(default_factory=dict[int, Pose])
+    """Other starts of some of its cars, by the cars' numbers."""
     tables: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
+    """Shape (K, 7) each. What each e-agent chooses (`agents.choices`), by the cars' numbers."""
     whims: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
+    """Shape (K, 5) each. What each free e-agent likes to do (`falsification.whims`), by the cars' numbers."""
 
     @property
     def choosing(self) -> list[int]:
@@ -124,9 +116,9 @@ def starts_of(genome: Genome, base: Instance) -> list[Pose]:
 def started(genome: Genome, base: Instance, starts: list[Pose], moved: Mapping[int, Pose]) -> Genome:
     """Return a genome with other starts; the same if one that is moved would be too near to another car."""
     apart = gap_radius(base.problem.car)
-    for car, own in moved.items():
+    for car, start in moved.items():
         for n, pose in enumerate(starts):
-            if n != car and hypot(pose.x - own.x, pose.y - own.y) < apart:
+            if n != car and hypot(pose.x - start.x, pose.y - start.y) < apart:
                 return genome
     return Genome(genome.base, genome.root, {**genome.starts, **moved}, genome.tables, genome.whims)
 
@@ -138,8 +130,8 @@ def span_of(base: Instance, pose: Pose) -> tuple[float, float] | None:
     if spot is None:
         return None
     k, along = spot
-    own = lots.places[k]
-    return min(own.low - along, 0.0), max(own.high - along, 0.0)
+    lot = lots.places[k]
+    return min(lot.low - along, 0.0), max(lot.high - along, 0.0)
 
 
 def spot_of(lots: Lots, pose: Pose) -> tuple[int, float] | None:
@@ -166,8 +158,8 @@ def lots_of(base: Instance) -> Lots:
     """Return where cars may start on the roads of an instance; kept with the network."""
     problem = base.problem
     key = _FREE, problem.car, problem.intersection_radius, problem.obstacles
-    found = problem.network.known.get(key)
-    if found is None:
+    lots = problem.network.known.get(key)
+    if lots is None:
         ground = Ground(problem.network, problem.car, problem.intersection_radius, problem.obstacles)
         lines, free = areas_of(ground).outside.tables()
         columns = np.column_stack((lines[free.lane], free.low, free.high)).tolist()
@@ -177,12 +169,12 @@ def lots_of(base: Instance) -> Lots:
         ]
         first: dict[int, int] = {}
         last: dict[int, int] = {}
-        for k, own in enumerate(places):
-            first.setdefault(own.lane, k)
-            last[own.lane] = k
+        for k, lot in enumerate(places):
+            first.setdefault(lot.lane, k)
+            last[lot.lane] = k
         ends = {lane: problem.network.lane_ends(lane) for lane in first}
-        found = problem.network.known[key] = Lots(places, _near(places), first, last, ends)
-    return found  # pyright: ignore[reportReturnType]  # what stands under our own key
+        lots = problem.network.known[key] = Lots(places, _near(places), first, last, ends)
+    return lots  # pyright: ignore[reportReturnType]  # what stands under our own key
 
 
 def _square(x: float, y: float) -> tuple[int, int]:
@@ -256,8 +248,8 @@ def _place(
     spot = spot_of(lots, genome.starts.get(EGO, base.starts[EGO]))
     if spot is None:
         return None
-    (places, _, first, last, ends), (own, along) = lots, spot
-    lane = places[own].lane
+    (places, _, first, last, ends), (lot, along) = lots, spot
+    lane = places[lot].lane
     vertex = ends[lane][1]
     if kind < LEAVES:
         end = 1 if kind < COMES else 0
@@ -266,10 +258,10 @@ def _place(
             return None
         arm = arms[int(dice.integers(len(arms)))]
         if kind < COMES:
-            return last[arm], places[last[arm]].high - places[own].high + along + near
+            return last[arm], places[last[arm]].high - places[lot].high + along + near
         return first[arm], places[first[arm]].low + abs(near)
     if kind < LEADS:
-        return own, along + gap_radius(base.problem.car) + abs(near)
+        return lot, along + gap_radius(base.problem.car) + abs(near)
     beside = last.get(lane ^ 1)
     if beside is None:
         return None
@@ -365,5 +357,5 @@ def _with_car(
         if car in genome.whims
         else replace(genome, tables={**genome.tables, car: other.tables[car]})
     )
-    found = started(taken, base, starts, {car: starts[car]})
-    return genome if found is taken else found
+    moved = started(taken, base, starts, {car: starts[car]})
+    return genome if moved is taken else moved

@@ -79,7 +79,7 @@ def load_settings(folder: Path) -> Settings:
     return parse(Settings, document, file=str(path))
 
 
-def own_secret(folder: Path, name: str) -> str:
+def secret_in(folder: Path, name: str) -> str:
     """Return a secret of this service that is drawn at its first start, in a file that only its owner may read."""
     path = folder / name
     try:
@@ -119,7 +119,7 @@ class Service:
         self.clock = clock
         self.database = Database(self.settings.database or f"sqlite:///{folder / 'service.db'}")
         self.storage = Storage(self.settings.storage or str(folder / "store"))
-        self.cookie_secret = own_secret(folder, "cookies.key")
+        self.cookie_secret = secret_in(folder, "cookies.key")
         self._key = None if key_file is None else _key(key_file, folder)
         self._competitions: dict[int, files.Competition] = {}
         self._seeds: dict[tuple[int, str], tuple[int, ...]] = {}
@@ -127,12 +127,12 @@ class Service:
 
     def competition(self, row: Competition) -> files.Competition:
         """Return a competition as its file says it."""
-        found = self._competitions.get(row.id)
-        if found is None:
+        loaded = self._competitions.get(row.id)
+        if loaded is None:
             place = self.place(row.slug)
-            found = files.Competition.from_document(json.loads(row.document), row.slug, place)
-            self._competitions[row.id] = found
-        return found
+            loaded = files.Competition.from_document(json.loads(row.document), row.slug, place)
+            self._competitions[row.id] = loaded
+        return loaded
 
     def place(self, slug: str) -> Path:
         """Return the folder of a competition: its file, sealed seeds and what is published."""

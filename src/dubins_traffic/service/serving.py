@@ -156,16 +156,10 @@ def serve(
 
     Parameters
     ----------
-    service : Service
-        Whose tables are up to date.
-    opened : socket
-        Where to listen.
     workers : int
         How many workers to keep beside the server.
     program : sequence of str
         The command of a worker, without its arguments.
-    trust : bool
-        As for workers.
     """
     config = uvicorn.Config(
         create_app(service),

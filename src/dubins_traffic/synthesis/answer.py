@@ -37,20 +37,20 @@ def strengthenings(assumption: Assumption, count: int, *, bends: bool) -> Iterat
     Those with the same parts come together, the weak ones first. `bends`: whether there are any.
     """
     words = dict.fromkeys(part_of(word) for word in WORDS)
-    own = {part_of(word): word for word in assumption.words()}
-    ladders_of = {part: [*_ladder(part, own.get(part), bends)] for part in words}
+    word_of = {part_of(word): word for word in assumption.words()}
+    ladders_of = {part: [*_ladder(part, word_of.get(part), bends)] for part in words}
     for parts in combinations((part for part in words if ladders_of[part]), count):
         ladders = [ladders_of[part] for part in parts]
         yield (
-            Assumption.parse((own | dict(zip(parts, steps, strict=True))).values())
+            Assumption.parse((word_of | dict(zip(parts, steps, strict=True))).values())
             for steps in product(*ladders)
         )
 
 
-def _ladder(part: str, own: str | None, bends: bool) -> Iterator[str]:
+def _ladder(part: str, word: str | None, bends: bool) -> Iterator[str]:
     """Yield the words of a part that are stronger than its own, the weak ones first."""
     steps = STEPS.get(part, (part,))
-    for step in steps[steps.index(own) + 1 if own in steps else 0 :]:
+    for step in steps[steps.index(word) + 1 if word in steps else 0 :]:
         if bends or step not in BENDS_ALONE:
             yield step
 
@@ -88,9 +88,9 @@ def smallest(
     for count in range(1, parts + 1):
         ladders = strengthenings(board.assumption, count, bends=bends)
         tried = (next(filter(wins, steps), None) for steps in ladders)
-        found = [assumption for assumption in tried if assumption is not None]
-        if found:
-            return found
+        winning = [assumption for assumption in tried if assumption is not None]
+        if winning:
+            return winning
     return []
 
 
@@ -99,27 +99,18 @@ VACUOUSLY: Final = "vacuously"
 
 @dataclass(frozen=True)
 class Answer:
-    """What synthesis says of an instance.
-
-    Attributes
-    ----------
-    solution : Solution
-        Who wins from which position.
-    instance : Instance
-        Of which it says so.
-    route_bound : int
-        Against how many e-agents an ego on shortest routes is proved to win.
-    seconds : float
-        Wall-clock time taken.
-    limit : int or None
-        Bytes of memory that may be used.
-    """
+    """What synthesis says of an instance."""
 
     solution: Solution
+    """Who wins from which position."""
     instance: Instance
+    """Of which it says so."""
     route_bound: int
+    """Against how many e-agents an ego on shortest routes is proved to win."""
     seconds: float
+    """Wall-clock time taken."""
     limit: int | None = field(repr=False)
+    """Bytes of memory that may be used."""
 
     @cached_property
     def starts(self) -> list[int]:
@@ -168,27 +159,27 @@ class Answer:
             "elsewhere": "from some positions, but not where the instance starts",
             "nowhere": "nowhere",
         }[self.outcome]
-        found = [
+        lines_of_text = [
             f"{_e_agents(board.others)}, {board.arena.cells} cells, crossings from degree "
             f"{board.arena.order_degree} on; assumed: {board.assumption}",
             f"{game.positions:,} positions, {game.moves:,} moves of the environment",
             f"The ego wins {where}.",
         ]
         if self.realizable == VACUOUSLY:
-            found.append(
+            lines_of_text.append(
                 "It wins vacuously: each of these wins rests on an assumption that can't be kept then."
             )
         vacuous = int(self.solution.vacuous.sum())
         if vacuous:
-            found.append(
+            lines_of_text.append(
                 f"Warning: in {vacuous:,} positions it wins only by bringing the e-agents to where they can't keep "
                 "their assumption. The strategy never does so, and gives these positions up."
             )
         if self.route_bound > 0:
-            found.append(
+            lines_of_text.append(
                 f"On shortest routes it is proved to win against up to {_e_agents(self.route_bound)}."
             )
-        return found
+        return lines_of_text
 
     def explain(self, progress: Progress | None = None) -> list[str]:
         """Return why the ego wins, or how it is stopped and what to assume so that it is not.
@@ -254,8 +245,6 @@ def answer(
 
     Parameters
     ----------
-    instance : Instance
-        Roads, goals, starts and e-agents.
     cars : int, optional
         E-agents; those of the instance, if not given.
     assumption : Assumption, optional

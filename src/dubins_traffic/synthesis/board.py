@@ -120,21 +120,14 @@ class Tables(NamedTuple):
 
 @dataclass(frozen=True)
 class Board:
-    """All positions of the ego and a number of e-agents on an arena.
-
-    Attributes
-    ----------
-    arena : Arena
-        The cells.
-    assumption : Assumption
-        What decides which positions there are, beside the cells.
-    others : int
-        E-agents, at most `MOST_OTHERS`.
-    """
+    """All positions of the ego and a number of e-agents on an arena."""
 
     arena: Arena
+    """The cells."""
     assumption: Assumption
+    """What decides which positions there are, beside the cells."""
     others: int
+    """E-agents, at most `MOST_OTHERS`."""
 
     @cached_property
     def _kinds(self) -> list[Kind]:
@@ -211,8 +204,8 @@ class Board:
             offset_at=_starts(len(part) for part in offsets),
             offset=np.concatenate(offsets),
             inbound=_padded([list(node.inbound) for node in nodes]),
-            exit_at=_starts(len(own) for own in exits),
-            exits=_ints(lane for own in exits for lane in own),
+            exit_at=_starts(len(lanes) for lanes in exits),
+            exits=_ints(lane for lanes in exits for lane in lanes),
             lane_node=ends[:, 0].copy(),
             lane_slot=ends[:, 1].copy(),
             **self._changes(),
@@ -222,7 +215,7 @@ class Board:
                 WHO.RENEWED if kind.forfeits is Forfeits.ONCE else WHO.OTHER for kind in self._kinds
             ),
             goal=_ints(self._goal_of(node.vertex) for node in nodes),
-            goal_nodes=_ints(len(own) for own in self.arena.goal_nodes),
+            goal_nodes=_ints(len(nodes_of_goal) for nodes_of_goal in self.arena.goal_nodes),
             crossing=_ints(node.crossing for node in nodes),
             opposite=_ints(self.arena.opposite(n) for n in range(len(nodes))),
             settings=self._settings(),
@@ -230,26 +223,28 @@ class Board:
 
     def _settings(self) -> Rows[Settings]:
         """Return `Tables.settings`."""
-        found, own = table(Settings, 1), self.assumption
-        row = found[0]
+        settings, assumption = table(Settings, 1), self.assumption
+        row = settings[0]
         row.others, row.positions, row.cells = self.others, self.positions, self.arena.cells
-        row.yields, row.frees = own.yields, own.frees
-        row.leaves, row.unmet = own.leaves is not Leaving.NEVER, own.leaves is Leaving.UNMET
-        row.moves_up = own.arrives is Arriving.MOVES_UP
-        return found
+        row.yields, row.frees = assumption.yields, assumption.frees
+        row.leaves, row.unmet = assumption.leaves is not Leaving.NEVER, assumption.leaves is Leaving.UNMET
+        row.moves_up = assumption.arrives is Arriving.MOVES_UP
+        return settings
 
     def _changes(self) -> dict[str, Ints]:
         """Return the tables of the scenes of all kinds, padded to four slots."""
-        found: dict[str, list[Ints]] = {}
-        for own in self.sceneries.values():
-            pad = SLOTS - own.kind.slots
-            described = own.described() | {"left": own.left(), "ego_entered": own.ego_entered()}
+        tables_of_kinds: dict[str, list[Ints]] = {}
+        for of_kind in self.sceneries.values():
+            pad = SLOTS - of_kind.kind.slots
+            described = of_kind.described() | {"left": of_kind.left(), "ego_entered": of_kind.ego_entered()}
             for name, row in described.items():
-                found.setdefault(name, []).append(row)
-            for name, changed in (("entered", own.entered()), ("removed", own.removed())):
-                found.setdefault(name, []).append(_wider(changed, ((0, 0), (0, pad))))
-            found.setdefault("arrived", []).append(_wider(own.arrived(), ((0, 0), (0, pad), (0, 0))))
-        return {name: np.concatenate(parts) for name, parts in found.items()}
+                tables_of_kinds.setdefault(name, []).append(row)
+            for name, changed in (("entered", of_kind.entered()), ("removed", of_kind.removed())):
+                tables_of_kinds.setdefault(name, []).append(_wider(changed, ((0, 0), (0, pad))))
+            tables_of_kinds.setdefault("arrived", []).append(
+                _wider(of_kind.arrived(), ((0, 0), (0, pad), (0, 0)))
+            )
+        return {name: np.concatenate(parts) for name, parts in tables_of_kinds.items()}
 
     def _goal_of(self, vertex: int) -> int:
         return self.arena.goals.index(vertex) if vertex in self.arena.goals else -1
@@ -274,16 +269,16 @@ class Board:
     def scenes(self, position: int) -> list[Scene]:
         """Return the scene of every node in a position."""
         left, ego, rest = self.others, 1, position
-        found: list[Scene] = []
+        scenes_of_nodes: list[Scene] = []
         for n in range(len(self.arena.nodes)):
-            own = self.scenery(n).scenes
-            start = int(self.tables.offset_at[n]) + (left * 2 + ego) * len(own)
-            row = self.tables.offset[start : start + len(own)]
+            at_node = self.scenery(n).scenes
+            start = int(self.tables.offset_at[n]) + (left * 2 + ego) * len(at_node)
+            row = self.tables.offset[start : start + len(at_node)]
             number = int(np.searchsorted(row, rest, side="right")) - 1
             rest -= int(row[number])
-            found.append(own[number])
-            left, ego = left - own[number].others, ego - own[number].egos
-        return found
+            scenes_of_nodes.append(at_node[number])
+            left, ego = left - at_node[number].others, ego - at_node[number].egos
+        return scenes_of_nodes
 
 
 def _ints(values: Iterable[int]) -> Ints:

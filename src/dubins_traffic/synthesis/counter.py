@@ -28,15 +28,10 @@ NEVER = np.int64(2**62)
 
 @dataclass
 class Counterstrategy:
-    """How the environment wins a game where the ego does not.
-
-    Parameters
-    ----------
-    solution : Solution
-        Who wins.
-    """
+    """How the environment wins a game where the ego does not."""
 
     solution: Solution
+    """Who wins."""
     _safe: dict[int, Flags] = field(default_factory=dict[int, Flags], repr=False)
     _turns: dict[tuple[int, int], Ints] = field(default_factory=dict[tuple[int, int], Ints], repr=False)
 
@@ -73,7 +68,7 @@ class Counterstrategy:
             return int(moves[0]), debt
         turns = self._until(level, debt)
         answers = [self._answers(move) for move in moves.tolist()]
-        worst = np.array([max((turns[after] for after in own), default=0) for own in answers])
+        worst = np.array([max((turns[after] for after in answer), default=0) for answer in answers])
         return int(moves[np.argmin(worst)]), debt
 
     def _moves(self, position: int) -> Ints:
@@ -131,8 +126,8 @@ class Counterstrategy:
         ends: list[Numbers] = []
         for turns in self.solution.game.turns():
             low, high = np.searchsorted(positions, (turns.first, turns.first + len(turns.at) - 1))
-            own = positions[low:high] - turns.first
-            row, edge = _edges(turns.at, own)
+            places = positions[low:high] - turns.first
+            row, edge = _edges(turns.at, places)
             good = safe[turns.to[edge]]
             rows.append(row[good] + low)
             ends.append(turns.to[edge[good]])
@@ -162,21 +157,14 @@ EGO_CAR = 0
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What stands where when the environment is to move.
-
-    Attributes
-    ----------
-    cells : tuple of int
-        Of each car, the ego's first.
-    orders : dict
-        For each node the lanes in which somebody waits in the order, first first.
-    rammed : bool
-        Whether an e-agent has driven into the ego.
-    """
+    """What stands where when the environment is to move."""
 
     cells: tuple[int, ...]
+    """Of each car, the ego's first."""
     orders: dict[int, tuple[int, ...]]
+    """For each node the lanes in which somebody waits in the order, first first."""
     rammed: bool = False
+    """Whether an e-agent has driven into the ego."""
 
 
 def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> list[str]:
@@ -184,8 +172,6 @@ def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> li
 
     Parameters
     ----------
-    counter : Counterstrategy
-        How it plays.
     position : int
         A lost position; where it begins.
     turns : int
@@ -273,8 +259,8 @@ def followed(board: Board, before: Moment, after: Moment) -> Moment:
     def assign(car: int) -> bool:
         if car == len(before.cells):
             return True
-        own = before.cells[car]
-        for cell in (own, *board.arena.following(own)):
+        cell_before = before.cells[car]
+        for cell in (cell_before, *board.arena.following(cell_before)):
             if cell in free:
                 free.remove(cell)
                 chosen.append(cell)

@@ -178,7 +178,7 @@ def reverse(at: Ints, to: Numbers, back_at: Ints, back: Numbers) -> None:
 
 
 @jit_long
-def own(owed_at: Ints, owner: Numbers) -> None:
+def assign_owners(owed_at: Ints, owner: Numbers) -> None:
     """Set `owner` (O,) to the position of each debt; those of position p begin at entry p of `owed_at` (N+1,)."""
     for position in range(owed_at.shape[0] - 1):
         for o in range(owed_at[position], owed_at[position + 1]):
@@ -197,8 +197,8 @@ def _turns(g: Graph, position: int) -> tuple[int, int]:
 
 
 @jit_long
-def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
-    """Set `found` (N,) to Cpre of `safe` (N,); `ready` (N+1,) is room."""
+def forced(g: Graph, safe: Flags, ready: Bytes, result: Flags) -> None:
+    """Set `result` (N,) to Cpre of `safe` (N,); `ready` (N+1,) is room."""
     count = safe.shape[0]
     ready[count] = 0
     for position in range(count):
@@ -208,11 +208,11 @@ def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
                 ready[position] = 1
                 break
     for position in range(count):
-        found[position] = True
+        result[position] = True
         first, last = _turns(g, position)
         for e in range(first, last):
             if ready[g.to[e]] == 0:
-                found[position] = False
+                result[position] = False
                 break
 
 
@@ -307,12 +307,12 @@ def _stays(g: Graph, s: Search, position: int) -> bool:
             continue
         if to >= s.mark.shape[0]:
             return False
-        found = False
+        stays = False
         for k in range(g.ego_at[to], g.ego_at[to + 1]):
             if s.mark[g.ego_to[k]]:
-                found = True
+                stays = True
                 break
-        if not found:
+        if not stays:
             return False
     return True
 

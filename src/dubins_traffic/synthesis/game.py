@@ -43,24 +43,16 @@ WORKERS: Final = min(2, os.cpu_count() or 1)
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """How large a game will be.
-
-    Attributes
-    ----------
-    positions : int
-        Exact.
-    moves : int
-        Of the environment, about.
-    bytes : int
-        Memory at the peak, about.
-    lean_bytes : int
-        The same for a lean game.
-    """
+    """How large a game will be."""
 
     positions: int
+    """Exact."""
     moves: int
+    """Of the environment, about."""
     bytes: int
+    """Memory at the peak, about."""
     lean_bytes: int
+    """The same for a lean game."""
 
 
 class Turns(NamedTuple):
@@ -80,46 +72,35 @@ class Game:
 
     Position N is none: it stands for the ego having been rammed. A *lean* game does not keep the moves of the
     environment, most of what a game consists of; they are worked out anew each time.
-
-    Attributes
-    ----------
-    board : Board
-        What the numbers of positions mean.
-    moves, most_moves : int
-        E, and the most from one position.
-    to_at : (N+1,) int64
-        Where the moves of the environment from each position begin in `to`. This and the next two are empty in a
-        lean game.
-    to : (E,) int32
-        The positions to which they lead; there the ego moves.
-    moved : (E,) uint8 or int64
-        Which of the e-agents that may move entered or left a node, as bits.
-    ego_at : (N+1,) int64
-        Where the moves of the ego from each position begin in `ego_to`.
-    ego_to : (F,) int32
-        The positions to which they lead; there the environment moves.
-    owed_at : (N+1,) int64
-        Where the debts of each position begin.
-    owed : (O,) int16
-        A cell: the assumption that whoever is there goes on some time. Number of cells + k: that goal k is freed.
-    owed_mask : (O,) uint8 or int64
-        The bits of `moved` that end the debt; others may.
-    ego_cell : (N,) int16
-        Cell of the ego.
     """
 
     board: Board
+    """What the numbers of positions mean."""
     moves: int
     most_moves: int
+    """`moves`, `most_moves`: e, and the most from one position."""
     to_at: Ints
+    """Shape (N+1,). Where the moves of the environment from each position begin in `to`. This and the next two are
+    empty in a lean game.
+    """
     to: Numbers
+    """Shape (E,). The positions to which they lead; there the ego moves."""
     moved: Masks
+    """Shape (E,). Which of the e-agents that may move entered or left a node, as bits."""
     ego_at: Ints
+    """Shape (N+1,). Where the moves of the ego from each position begin in `ego_to`."""
     ego_to: Numbers
+    """Shape (F,). The positions to which they lead; there the environment moves."""
     owed_at: Ints
+    """Shape (N+1,). Where the debts of each position begin."""
     owed: Cells
+    """Shape (O,). A cell: the assumption that whoever is there goes on some time. Number of cells + k: that goal k
+    is freed.
+    """
     owed_mask: Masks
+    """Shape (O,). The bits of `moved` that end the debt; others may."""
     ego_cell: Cells
+    """Shape (N,). Cell of the ego."""
 
     @property
     def positions(self) -> int:
@@ -213,15 +194,9 @@ def build(
 
     Parameters
     ----------
-    board : Board
-        The positions.
     limit : int, optional
         Bytes of memory that may be used; half of what the machine has, if not given. A game that would take more is
         built lean.
-    progress : callable, optional
-        Told about it now and then.
-    workers : int
-        Threads.
 
     Raises
     ------
@@ -361,10 +336,10 @@ WHO_NAMES: Final = ("e-agent", "ego", "e-agent that has forfeited")
 
 def scene_numbers(board: Board) -> Numbers:
     """Return the scene (N, V) of each node in each position, numbered as in the header."""
-    found = np.empty((board.positions, len(board.arena.nodes)), dtype=np.int32)
+    numbers = np.empty((board.positions, len(board.arena.nodes)), dtype=np.int32)
     room = np.empty(len(board.arena.nodes), dtype=np.int64)
-    list_scenes(board.tables, room, found)
-    return found
+    list_scenes(board.tables, room, numbers)
+    return numbers
 
 
 def header(board: Board) -> dict[str, Any]:

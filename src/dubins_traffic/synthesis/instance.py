@@ -25,8 +25,6 @@ def arena_of(problem: Problem, order_degree: int | None = None) -> Arena:
 
     Parameters
     ----------
-    problem : Problem
-        Roads and goals.
     order_degree : int, optional
         Least degree of a crossing; that of the problem's rules, if not given.
 

@@ -78,16 +78,16 @@ def _may_leave(t: Tables, work: Work, node: int) -> bool:
 @jit
 def _to_free(t: Tables, work: Work, goal: int) -> int:
     """E6: return a node of a goal that an e-agent is in, or -1 if there is none or the ego keeps the goal closed."""
-    found = -1
+    node_to_free = -1
     free = False
     ego = False
     for v in range(t.base.shape[0]):
         if t.goal[v] == goal and _inside(t, work, v) == 1:
-            found = v
+            node_to_free = v
             out, near = _ways_out(t, work, v)
             free = free or out
             ego = ego or near > 0 or _inside(t, work, t.opposite[v]) == WHO.EGO + 1
-    return -1 if ego and not free else found
+    return -1 if ego and not free else node_to_free
 
 
 @jit
@@ -281,8 +281,8 @@ def _permute(turn: Ints, low: int, high: int) -> bool:
     pivot = high - 2
     while pivot >= low and turn[pivot] > turn[pivot + 1]:
         pivot -= 1
-    found = pivot >= low
-    if found:
+    has_next = pivot >= low
+    if has_next:
         other = high - 1
         while turn[other] < turn[pivot]:
             other -= 1
@@ -293,7 +293,7 @@ def _permute(turn: Ints, low: int, high: int) -> bool:
         turn[left], turn[right] = turn[right], turn[left]
         left += 1
         right -= 1
-    return found
+    return has_next
 
 
 @jit
@@ -357,9 +357,9 @@ def _ego(t: Tables, position: int, work: Work, out: Moves) -> int:
                     used += 1
                     work.scenes[to] = before
         else:
-            own = t.taken[scene] & ~t.others_slots[scene]
+            places = t.taken[scene] & ~t.others_slots[scene]
             for slot in range(SLOTS):
-                if own >> slot & 1:
+                if places >> slot & 1:
                     cell = t.base.shape[0] + t.inbound[v, slot]
             if t.ego_entered[scene] != IMPOSSIBLE:
                 work.scenes[v] = t.ego_entered[scene]

@@ -89,8 +89,8 @@ class Work(NamedTuple):
         shapes = dict.fromkeys(("scenes", "moved_scenes", "arrived_scenes"), (nodes,))
         shapes |= {"choice": (cars, MOST_CHOICES)}
         arrays = cls._fields[:-1]
-        found = {name: np.zeros(shapes.get(name, (cars,)), dtype=np.int64) for name in arrays}
-        return cls(**found, total=table(Totals, 1))
+        arrays_by_name = {name: np.zeros(shapes.get(name, (cars,)), dtype=np.int64) for name in arrays}
+        return cls(**arrays_by_name, total=table(Totals, 1))
 
 
 class Moves(NamedTuple):
@@ -168,9 +168,9 @@ def rank(t: Tables, scenes: Ints) -> int:
 
 
 @jit_long
-def list_scenes(t: Tables, scenes: Ints, found: Numbers) -> None:
-    """Set `found` (N, V) to the scene of every node in every position; `scenes` (V,) is room."""
-    for position in range(found.shape[0]):
+def list_scenes(t: Tables, scenes: Ints, numbers: Numbers) -> None:
+    """Set `numbers` (N, V) to the scene of every node in every position; `scenes` (V,) is room."""
+    for position in range(numbers.shape[0]):
         unrank(t, position, scenes)
         for v in range(scenes.shape[0]):
-            found[position, v] = scenes[v]
+            numbers[position, v] = scenes[v]

@@ -36,13 +36,7 @@ class Sighting(NamedTuple):
 
 
 class Ground:
-    """The cells of an arena as places on the road.
-
-    Parameters
-    ----------
-    arena : Arena
-        The cells.
-    """
+    """The cells of an arena as places on the road."""
 
     def __init__(self, arena: Arena) -> None:
         network = arena.network
@@ -151,24 +145,16 @@ NEW_TICKET: Final = "new_ticket"
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """How the road is seen.
-
-    Attributes
-    ----------
-    sight : float
-        The ego sees the cars within this distance, metres.
-    margin : float
-        How far from an intersection a car in its disc may be, metres.
-    look : int
-        Ticks after which it is asked again where unseen cars may be.
-    assume_ego : bool
-        Whether a place is assumed for the ego, too, while it is behind another car in its cell.
-    """
+    """How the road is seen."""
 
     sight: float
+    """The ego sees the cars within this distance, metres."""
     margin: float
+    """How far from an intersection a car in its disc may be, metres."""
     look: int
+    """Ticks after which it is asked again where unseen cars may be."""
     assume_ego: bool = False
+    """Whether a place is assumed for the ego, too, while it is behind another car in its cell."""
 
 
 class MoveList:
@@ -198,12 +184,8 @@ class RoadPlay:
 
     Parameters
     ----------
-    board : Board
-        The game.
     sight : Sight
         How the road is seen.
-    names : sequence of str
-        Of the cars, the ego first.
 
     Attributes
     ----------
@@ -324,8 +306,8 @@ class RoadPlay:
         if car in self._seen:
             return self.ground.nearest_free(start, taken, avoided)
         open_to_view = {other for other in range(self._board.arena.cells) if self._would_be_seen(other)}
-        found = self.ground.nearest_free(start, taken | open_to_view, avoided)
-        return found if found != NOWHERE else self.ground.nearest_free(start, taken, avoided)
+        free_cell = self.ground.nearest_free(start, taken | open_to_view, avoided)
+        return free_cell if free_cell != NOWHERE else self.ground.nearest_free(start, taken, avoided)
 
     def _put(self, car: int, cell: int) -> None:
         """Move a car, out of the queue it is in and last into the one it comes to."""
@@ -416,11 +398,11 @@ class RoadPlay:
         inside = {cell: car for car, cell in enumerate(self.cells) if cell < nodes}
         scenes: list[Scene] = []
         for node, queue in enumerate(self._queues):
-            own = inside.get(node)
-            if own is None and not queue:
+            occupant = inside.get(node)
+            if occupant is None and not queue:
                 scenes.append(EMPTY)
                 continue
-            scenes.append(self._scene(node, own, queue))
+            scenes.append(self._scene(node, occupant, queue))
         try:
             return board.number(scenes)
         except KeyError:

@@ -20,8 +20,6 @@ def route_bound(arena: Arena, assumption: Assumption) -> int:
 
     Parameters
     ----------
-    arena : Arena
-        The cells.
     assumption : Assumption
         The proof needs E1 to E5, E4 in full, that forfeits are bounded, and crossings wherever three roads meet; it
         does not need E6. Without these the bound is 0.
@@ -38,12 +36,12 @@ def route_bound(arena: Arena, assumption: Assumption) -> int:
 
 def waits(arena: Arena) -> set[tuple[int, int]]:
     """Return where an ego on shortest routes may have to wait, and for which cell."""
-    found: set[tuple[int, int]] = set()
+    pairs: set[tuple[int, int]] = set()
     for nodes in arena.targets:
         far = distances(arena, nodes)
-        for cell, own in far.items():
-            found |= {(cell, ahead) for ahead in arena.following(cell) if far.get(ahead) == own - 1}
-    return found
+        for cell, distance in far.items():
+            pairs |= {(cell, ahead) for ahead in arena.following(cell) if far.get(ahead) == distance - 1}
+    return pairs
 
 
 def distances(arena: Arena, targets: Iterable[int]) -> dict[int, int]:
@@ -69,18 +67,18 @@ def region(arena: Arena, first: int, ego: int, *, full: bool) -> set[int]:
     `full`: whether who is before a bend or dead end that is clear goes in though its exits are taken, so that these
     are held too.
     """
-    found = {first}
+    cells = {first}
     waiting = [first]
     while waiting:
         cell = waiting.pop()
         if _excused(arena, cell, ego):
             continue
         for ahead in arena.following(cell):
-            if ahead != ego and ahead not in found:
-                found.add(ahead)
+            if ahead != ego and ahead not in cells:
+                cells.add(ahead)
                 waiting.append(ahead)
     nodes = arena.nodes
-    return {cell for cell in found if full or cell == first or cell >= len(nodes) or nodes[cell].crossing}
+    return {cell for cell in cells if full or cell == first or cell >= len(nodes) or nodes[cell].crossing}
 
 
 def _excused(arena: Arena, cell: int, ego: int) -> bool:

@@ -15,7 +15,6 @@ from itertools import combinations, permutations
 from typing import Final
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.logic.exports import FORMATS, Specification
 from dubins_traffic.logic.formula import (
     Formula,
     Op,
@@ -30,6 +29,7 @@ from dubins_traffic.logic.formula import (
     prop,
 )
 from dubins_traffic.logic.rewrite import simplify
+from dubins_traffic.specifications.exports import FORMATS, Specification
 from dubins_traffic.synthesis.assumption import Arriving, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board
 
@@ -41,16 +41,13 @@ MOST_CARS: Final = 4
 
 
 FORMS: Final = {".structuredslugs": "slugs", ".tlsf": "tlsf", ".py": "tulip"}
-"""Endings of files of specifications, and the formats of `logic.exports` that they stand for."""
+"""Endings of files of specifications, and the formats of `specifications.exports` that they stand for."""
 
 
 def specification_text(board: Board, starts: Sequence[int], ending: str) -> str:
     """Return the game as a specification in the format that an ending of files stands for.
 
-    Raises
-    ------
-    InputError
-        As `specification`, and for another ending.
+    InputError as `specification`, and for another ending.
     """
     if ending not in FORMS:
         expected = f"a name that ends in {', '.join(FORMS)}"
@@ -98,8 +95,6 @@ def specification(board: Board, starts: Sequence[int]) -> Specification:
 
     Parameters
     ----------
-    board : Board
-        The positions.
     starts : sequence of int
         The cells in which the cars start, the ego first; no two the same.
 
@@ -115,8 +110,8 @@ def specification(board: Board, starts: Sequence[int]) -> Specification:
         "E3": assumed.forfeits is Forfeits.NEVER,
         "E5": assumed.arrives is not Arriving.NEVER,
     }
-    for part, said in wanted.items():
-        if not said:
+    for part, is_sayable in wanted.items():
+        if not is_sayable:
             raise InputError(
                 f"a game without {part}, or with a weaker form, has no specification",
                 field="assume",
@@ -226,9 +221,9 @@ class _Writer:
         )
 
     def _before(self, i: int, j: int, *, later: bool = False) -> Formula:
-        found = prop(order_name(min(i, j), max(i, j)))
-        found = next_(found) if later else found
-        return found if i < j else negation(found)
+        bit = prop(order_name(min(i, j), max(i, j)))
+        bit = next_(bit) if later else bit
+        return bit if i < j else negation(bit)
 
     def _first(self, i: int) -> Formula:
         """Say that nobody waits at the same crossing before a car."""
@@ -354,5 +349,5 @@ class _Writer:
 
 def _simple(parts: Iterable[Formula]) -> tuple[Formula, ...]:
     """Return parts without constants, and without those that are always true."""
-    found = (simplify(part) for part in parts)
-    return tuple(part for part in found if part.op is not Op.TRUE)
+    simplified = (simplify(part) for part in parts)
+    return tuple(part for part in simplified if part.op is not Op.TRUE)

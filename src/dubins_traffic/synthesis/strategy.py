@@ -40,18 +40,12 @@ VERSION: Final = 2
 
 @dataclass(frozen=True)
 class Strategy:
-    """How the ego wins.
-
-    Attributes
-    ----------
-    board : Board
-        What the numbers of positions mean.
-    ranks : tuple of Ranks
-        One table a goal, in the order of `Arena.goals`.
-    """
+    """How the ego wins."""
 
     board: Board
+    """What the numbers of positions mean."""
     ranks: tuple[Ranks, ...]
+    """One table a goal, in the order of `Arena.goals`."""
 
     @classmethod
     def of(cls, solution: Solution) -> Strategy:
@@ -60,11 +54,13 @@ class Strategy:
 
     def wins(self, position: int) -> bool:
         """Say whether the strategy wins from a position in which the environment is to move."""
-        return 0 <= position < self.board.positions and all(own.rank[position] >= 0 for own in self.ranks)
+        return 0 <= position < self.board.positions and all(
+            ranks_of_goal.rank[position] >= 0 for ranks_of_goal in self.ranks
+        )
 
     def first(self) -> int:
         """Return the first position from which the strategy wins; InputError if there is none."""
-        won = np.logical_and.reduce([own.rank >= 0 for own in self.ranks])
+        won = np.logical_and.reduce([ranks_of_goal.rank >= 0 for ranks_of_goal in self.ranks])
         if not won.any():
             raise InputError("a strategy that wins from nowhere", expected="some position")
         return int(np.argmax(won))
@@ -96,9 +92,9 @@ class Strategy:
             "assume": list(self.board.assumption.words()),
         }
         arrays: dict[str, Any] = {
-            **{f"rank_{k}": _narrow(own.rank) for k, own in enumerate(self.ranks)},
-            **{f"start_{k}": own.start for k, own in enumerate(self.ranks)},
-            **{f"debt_{k}": own.debt for k, own in enumerate(self.ranks)},
+            **{f"rank_{k}": _narrow(ranks_of_goal.rank) for k, ranks_of_goal in enumerate(self.ranks)},
+            **{f"start_{k}": ranks_of_goal.start for k, ranks_of_goal in enumerate(self.ranks)},
+            **{f"debt_{k}": ranks_of_goal.debt for k, ranks_of_goal in enumerate(self.ranks)},
         }
         save_arrays(path, header, arrays, overwrite=overwrite)
 
@@ -114,11 +110,11 @@ class Strategy:
         """
         with Archive(path, "strategy") as archive:
             try:
-                found = _strategy(archive)
-                found.first()
+                strategy = _strategy(archive)
+                strategy.first()
             except InputError as error:
                 raise error if error.file else error.within(file=str(path)) from None
-        return found
+        return strategy
 
 
 class _Header(BaseModel):
@@ -183,21 +179,14 @@ def _header(archive: Archive) -> _Header:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What to do at the end of a lane.
-
-    Attributes
-    ----------
-    node : int
-        The intersection ahead.
-    enter : bool
-        Whether to enter it as soon as the rules allow, or to wait.
-    exits : tuple of int
-        Lanes out that are free in the game, the best first; empty where the ego may not enter yet.
-    """
+    """What to do at the end of a lane."""
 
     node: int
+    """The intersection ahead."""
     enter: bool
+    """Whether to enter it as soon as the rules allow, or to wait."""
     exits: tuple[int, ...]
+    """Lanes out that are free in the game, the best first; empty where the ego may not enter yet."""
 
 
 class Adviser(Protocol):
@@ -242,8 +231,6 @@ def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Adv
 
     Parameters
     ----------
-    strategy : Strategy
-        The ego's.
     play : RoadPlay
         Where the play is.
     goal, following : int
@@ -259,8 +246,8 @@ def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Adv
     if len(options) == 1:
         return Advice(node, True, ())
     inside = options[1]
-    own = strategy.ranks[goal].rank
-    after = strategy.ranks[following if own[inside] == 0 else goal].rank
+    rank = strategy.ranks[goal].rank
+    after = strategy.ranks[following if rank[inside] == 0 else goal].rank
     free = [
         lane
         for lane in board.arena.nodes[node].exits
@@ -268,7 +255,7 @@ def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Adv
     ]
     ways = zip(free, play.moves.of_ego(inside)[1:], strict=True)
     ranked = sorted((int(after[then]), lane) for lane, then in ways if after[then] >= 0)
-    enters = own[inside] >= 0 and (own[position] < 0 or own[inside] <= own[position])
+    enters = rank[inside] >= 0 and (rank[position] < 0 or rank[inside] <= rank[position])
     return Advice(node, bool(enters), tuple(lane for _, lane in ranked))
 
 
@@ -283,25 +270,15 @@ class StrategyError(DubinsTrafficError):
 def check(game: Game, ranks: Sequence[Ranks]) -> None:
     """Check that the ego wins by these ranks from every position that has one.
 
-    Parameters
-    ----------
-    game : Game
-        The game.
-    ranks : sequence of Ranks
-        One table a goal.
-
-    Raises
-    ------
-    StrategyError
-        If it does not: names the first position where a condition above fails.
+    StrategyError if it does not: names the first position where a condition above fails.
     """
-    for goal, own in enumerate(ranks):
+    for goal, ranks_of_goal in enumerate(ranks):
         following = ranks[(goal + 1) % len(ranks)]
-        reached = own.rank == 0
+        reached = ranks_of_goal.rank == 0
         if (reached & ~game.at_target(goal)).any():
             raise _error(game, goal, reached & ~game.at_target(goal), "has rank 0 away from the goal")
-        best = answers(game, own)
-        wrong = _astray(game, own, best)
+        best = answers(game, ranks_of_goal)
+        wrong = _astray(game, ranks_of_goal, best)
         if wrong.any():
             raise _error(game, goal, wrong, "leads to no lower rank while nothing is owed")
         lost = reached & (_worst(game, answers(game, following)) == LOST)

@@ -60,9 +60,9 @@ class Sessions(ServerSideSessionBackend):
 
     async def load_from_connection(self, connection: ASGIConnection[Any, Any, Any, Any]) -> dict[str, Any]:
         """Return the session of a request, and remember it."""
-        found = await super().load_from_connection(connection)  # pyright: ignore[reportUnknownMemberType]
-        connection.scope["state"][LOADED] = dict(found)
-        return found
+        data = await super().load_from_connection(connection)  # pyright: ignore[reportUnknownMemberType]
+        connection.scope["state"][LOADED] = dict(data)
+        return data
 
     async def store_in_message(
         self, scope_session: Any, message: Message, connection: ASGIConnection[Any, Any, Any, Any]

@@ -30,15 +30,7 @@ class Place(NamedTuple):
 
 
 class Labelled:
-    """The game with cars that have names.
-
-    Parameters
-    ----------
-    board : Board
-        The game.
-    moves : MoveList
-        Its moves.
-    """
+    """The game with cars that have names."""
 
     def __init__(self, board: Board, moves: MoveList) -> None:
         self.board = board
@@ -48,16 +40,16 @@ class Labelled:
 
     def letter(self, place: Place) -> Letter:
         """Return what the environment says of a place: the cells of its cars and the order among them."""
-        found = {
+        bits = {
             name: bool(cell >> bit & 1)
             for names, cell in zip(self._bits[1:], place.cells[1:], strict=True)
             for bit, name in enumerate(names)
         }
-        orders = dict.fromkeys((name for name in self._inputs if name not in found), False)
+        orders = dict.fromkeys((name for name in self._inputs if name not in bits), False)
         for first, second in self._before(place):
             if EGO not in (first, second) and first < second:
                 orders[order_name(first, second)] = True
-        return found | {name: value for name, value in orders.items() if name in self._inputs}
+        return bits | {name: value for name, value in orders.items() if name in self._inputs}
 
     def _before(self, place: Place) -> Iterator[tuple[int, int]]:
         """Yield who waits before whom at a crossing."""
@@ -74,15 +66,15 @@ class Labelled:
 
     def moved(self, place: Place, cell: int) -> Place | None:
         """Return the place after the ego has gone to a cell, None if it may not."""
-        own = place.cells[EGO]
-        if cell == own:
+        cell_now = place.cells[EGO]
+        if cell == cell_now:
             return place
         options = self._moves.of_ego(place.position)[1:]
         arena, nodes = self.board.arena, len(self.board.arena.nodes)
-        if own < nodes:
-            free = [nodes + lane for lane in arena.nodes[own].exits if nodes + lane not in place.cells]
+        if cell_now < nodes:
+            free = [nodes + lane for lane in arena.nodes[cell_now].exits if nodes + lane not in place.cells]
         else:
-            free = [arena.lane_end[own - nodes][0]]
+            free = [arena.lane_end[cell_now - nodes][0]]
         ways = dict(zip(free, options, strict=False))
         return Place(ways[cell], (cell, *place.cells[1:])) if cell in ways else None
 
@@ -101,13 +93,13 @@ class Labelled:
     def _taken(self, position: int) -> frozenset[int]:
         """Return the cells that are taken in a position."""
         nodes = self.board.arena.nodes
-        found: set[int] = set()
+        cells: set[int] = set()
         for number, (node, scene) in enumerate(zip(nodes, self.board.scenes(position), strict=True)):
             if scene.inside is not None:
-                found.add(number)
+                cells.add(number)
             slots = [*(slot for slot, _ in scene.queue), *scene.parked]
-            found |= {len(nodes) + node.inbound[slot] for slot in slots}
-        return frozenset(found)
+            cells |= {len(nodes) + node.inbound[slot] for slot in slots}
+        return frozenset(cells)
 
     def _assigned(self, cells: Sequence[int], taken: frozenset[int]) -> Iterator[tuple[int, ...]]:
         """Yield the cells to which cars may have gone such that they take just these, each one of its own."""
@@ -132,8 +124,8 @@ class Labelled:
 def misfit(board: Board, machine: Machine) -> tuple[str, str] | None:
     """Return a proposition in which a machine and a game differ, and how; None if there is none."""
     bits = car_bits(EGO, board.arena.cells)
-    own = {*bits, *(order_name(EGO, car) for car in range(1, board.others + 1))}
-    known = own.union(inputs_of(board))
+    its_inputs = {*bits, *(order_name(EGO, car) for car in range(1, board.others + 1))}
+    known = its_inputs.union(inputs_of(board))
     for name in machine.names:
         if name not in known:
             return name, "a strategy for another problem"
@@ -142,10 +134,10 @@ def misfit(board: Board, machine: Machine) -> tuple[str, str] | None:
             return name, "a strategy for another problem"
     sides = machine.sides or Sides((), ())
     for name in sides.read:
-        if name in own:
+        if name in its_inputs:
             return name, "a strategy that reads what the ego chooses"
     for name in sides.answered:
-        if name not in own:
+        if name not in its_inputs:
             return name, "a strategy that chooses for the others"
     return None
 
@@ -176,10 +168,6 @@ class MachineAdviser:
 
     Parameters
     ----------
-    board : Board
-        The game.
-    machine : Machine
-        The strategy.
     fallback : bool
         Whether the ego goes on without the machine where that makes no move of the game.
     """
@@ -263,15 +251,15 @@ class MachineAdviser:
     def _stray(self, what: str) -> None:
         """Take note that the machine makes no move of the game."""
         if not self._fallback:
-            told = "with +fallback behind its file, the ego goes on by the rules"
-            raise DubinsTrafficError(f"the strategy {what} ({told})")
+            advice = "with +fallback behind its file, the ego goes on by the rules"
+            raise DubinsTrafficError(f"the strategy {what} ({advice})")
 
     def _wrong_move(self, turn: Turn) -> str:
         """Say what the machine answers in a turn in which that is no move of the game."""
-        found = self._machine.step(turn.state, self._labelled.letter(turn.place))
-        if found is None:
+        step = self._machine.step(turn.state, self._labelled.letter(turn.place))
+        if step is None:
             return f"has no answer where the cars are in cells {turn.place.cells}"
-        way = f"from cell {turn.place.cells[EGO]} to cell {self._labelled.ego_cell(found[1])}"
+        way = f"from cell {turn.place.cells[EGO]} to cell {self._labelled.ego_cell(step[1])}"
         return f"sends the ego {way}, which is no move of the game"
 
     def _followed(self, place: Place) -> Turn | None:
@@ -307,11 +295,11 @@ class MachineAdviser:
 
     def _answer(self, place: Place, state: State) -> _Answer | None:
         """Return what the machine answers to a place; None if nothing, or a move that is none of the game."""
-        found = self._machine.step(state, self._labelled.letter(place))
-        if found is None:
+        step = self._machine.step(state, self._labelled.letter(place))
+        if step is None:
             return None
-        after = self._labelled.moved(place, self._labelled.ego_cell(found[1]))
-        return None if after is None else _Answer(found[0], after)
+        after = self._labelled.moved(place, self._labelled.ego_cell(step[1]))
+        return None if after is None else _Answer(step[0], after)
 
     def _explore(self, place: Place, state: State) -> None:
         """Note in which states the machine may be where, in the plays from a place."""

@@ -48,14 +48,8 @@ class MaestroServices:
 
     Parameters
     ----------
-    rospy : module
-        With this process a node.
-    mailbox : Mailbox
-        Where requests go.
     maestro : Maestro, optional
         Who answers mode requests; without one there is no mode service.
-    parameters : SessionParameters
-        The session, for parameters.
     simulated : bool
         Whether the cars are simulated here, so that pausing and placing them is served.
     foreign : ForeignMaestro, optional
@@ -194,8 +188,6 @@ class Ros1:
         The ROS master's.
     maestro : Maestro, optional
         Who grants modes; without one trials start by themselves.
-    parameters : SessionParameters
-        The session, for parameters.
     clock : bool
         Whether `/clock` is published and messages are stamped with simulated time; else with the wall clock's.
     simulated : bool

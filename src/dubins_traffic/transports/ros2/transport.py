@@ -50,10 +50,6 @@ class MaestroServices:
 
     Parameters
     ----------
-    graph : Graph
-        Where.
-    mailbox : Mailbox
-        Where requests go.
     maestro : Maestro, optional
         Who answers mode requests; without one there is no mode service.
     """

@@ -32,8 +32,6 @@ class World:
 
     Parameters
     ----------
-    graph : Graph
-        Where.
     clock : bool
         Whether `/clock` is published.
     """
