@@ -25,7 +25,7 @@ WHAT = {
     "service": "accounts, the queue, pages, workers",
     "competition": "phases, submissions, places; frozen sets of problems, results",
     "falsification": "the search for the worst case",
-    "campaign": "many trials and their reports; a check of controllers; bags and logs",
+    "campaign": "many trials, their reports; checks of controllers; bags, logs; live pages",
     "sessions": "drivers or worlds in other processes",
     "envs": "environments for learning",
     "engine": "many trials in one compiled pass",
