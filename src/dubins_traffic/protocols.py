@@ -168,10 +168,18 @@ class Watcher(Protocol):
         """Begin a trial whose cars have been placed; `watch` with frame 0 follows."""
         ...
 
-    def watch(self, tick: int, state: State, labels: Labels, observe: Callable[[], Observation]) -> None:
+    def watch(
+        self,
+        tick: int,
+        state: State,
+        labels: Labels,
+        contacts: Sequence[Contact],
+        observe: Callable[[], Observation],
+    ) -> None:
         """Look at frame `tick`, just reached; the arrays (1, N) are the simulator's own and change in the next tick.
 
-        `observe` returns the ego's observation of this frame; it is made once, however often it is called.
+        `contacts` are those of the tick that led there, `at_fault` filled in. `observe` returns the ego's observation
+        of this frame; it is made once, however often it is called.
 
         Raises
         ------

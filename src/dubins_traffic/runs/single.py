@@ -15,7 +15,7 @@ from dubins_traffic.outside import put_back
 from dubins_traffic.problem.draw import check_numbers
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.protocols import Controller, Driver, Ending, Link, Simulator, Sink
+from dubins_traffic.protocols import Controller, Driver, Ending, Link, Simulator, Sink, Watcher
 from dubins_traffic.record import wall
 from dubins_traffic.record.writer import RecordWriter
 from dubins_traffic.scoring import registry as scores
@@ -43,6 +43,8 @@ class Trial(BareTrial):
         Replaces the simulator that the instance names.
     link : Link, optional
         Connects to the drivers of remote cars.
+    watchers : sequence of Watcher
+        Are shown every frame at once.
 
     Raises
     ------
@@ -67,6 +69,7 @@ class Trial(BareTrial):
         record: Path | str | None = None,
         simulator: Simulator | None = None,
         link: Link | None = None,
+        watchers: Sequence[Watcher] = (),
     ) -> None:
         agents = _agents(instance, link)
         writer = () if record is None else (RecordWriter(record),)
@@ -75,7 +78,8 @@ class Trial(BareTrial):
             simulator=simulator or simulators.load(instance.simulator),
             agents=agents,
             sinks=(*writer, *sinks),
-            watchers=() if link is None else (link,),
+            watchers=watchers if link is None else (link, *watchers),
+            linked=link is not None,
         )
 
     def fork(
@@ -208,6 +212,7 @@ def run_trial(
     sketch: bool = True,
     name: str | None = None,
     metrics: Sequence[MetricSpec] = (),
+    watchers: Sequence[Watcher] = (),
 ) -> Result:
     """Run one controller on one instance, and score it.
 
@@ -236,6 +241,8 @@ def run_trial(
         Name of the controller in record and score; by default the name by which it was given, or that of its class.
     metrics : sequence of str or callable
         Further metrics: names, ``module:Class``, ``path/to/file.py:Class``, or classes (docs/extending/metric.md).
+    watchers : sequence of Watcher
+        Are shown every frame at once.
 
     Raises
     ------
@@ -254,7 +261,13 @@ def run_trial(
     try:
         with (
             put_back(),
-            Trial(instance, sinks=(*first, *drawn, scorer, *sinks), link=link, simulator=simulator) as trial,
+            Trial(
+                instance,
+                sinks=(*first, *drawn, scorer, *sinks),
+                link=link,
+                simulator=simulator,
+                watchers=watchers,
+            ) as trial,
         ):
             try:
                 ending, measured = run(trial, driver, deadline)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
+from dubins_traffic.cars.state import EGO, Command, Contact, Labels, Observation, State
 from dubins_traffic.errors import InputError, PeerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.observations.senses import Senses
@@ -97,7 +97,14 @@ class Link:
         self.inbox.expect(self._remote)
         self.transport.begin(instance, self._remote)
 
-    def watch(self, tick: int, state: State, labels: Labels, observe: Callable[[], Observation]) -> None:
+    def watch(
+        self,
+        tick: int,
+        state: State,
+        labels: Labels,
+        contacts: Sequence[Contact],  # noqa: ARG002  # drivers are sent poses and labels
+        observe: Callable[[], Observation],
+    ) -> None:
         """Send frame `tick` when it is due."""
         if self._running:
             due = self.clock.due(tick)
