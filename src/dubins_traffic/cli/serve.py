@@ -72,7 +72,7 @@ def serve(
         check_boxes(trust=trust)
     place = Path(folder)
     service = Service(place, default_key(place) if key_file is None else Path(key_file))
-    opened = serving.listen(serving.Place(host, port))
+    opened = serving.listen(serving.ListenAddress(host, port))
     url = serving.address_of(opened)
     joining = serving.prepare(service, [Path(path) for path in competition or ()], url)
     print(f"Serving {folder} at {service.settings.url or url}", flush=True)

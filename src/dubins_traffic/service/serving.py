@@ -20,9 +20,9 @@ from sqlalchemy.orm import Session
 from dubins_traffic.errors import InputError
 from dubins_traffic.service import accounts, organising
 from dubins_traffic.service.client import TOKEN
+from dubins_traffic.service.database_tables import Account, Code, Token
 from dubins_traffic.service.housekeeping import Housekeeper
 from dubins_traffic.service.service import Service, competition_of
-from dubins_traffic.service.tables import Account, Code, Token
 from dubins_traffic.service.web.app import create_app
 
 log = structlog.get_logger("dubins_traffic.service")
@@ -30,14 +30,14 @@ WATCH_S = 1.0
 
 
 @dataclass(frozen=True)
-class Place:
+class ListenAddress:
     """Where to listen: host and port, 0 for any that is free."""
 
     host: str = "127.0.0.1"
     port: int = 8000
 
 
-def listen(place: Place) -> socket.socket:
+def listen(place: ListenAddress) -> socket.socket:
     """Return a socket that listens at a place.
 
     InputError if somebody else does, or it is no place of this machine.
