@@ -24,7 +24,6 @@ from typing import Any
 
 from benchmarks.table import Row, show
 
-from dubins_traffic.controllers.synthesized import STRATEGY_LEFT, Synthesized
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End, Ending
@@ -37,6 +36,7 @@ from dubins_traffic.synthesis.instance import assumption_of, cells_of
 from dubins_traffic.synthesis.road_play import NEW_TICKET, UNKNOWN_MOVE
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
+from dubins_traffic.synthesis.synthesized import STRATEGY_LEFT, Synthesized
 from experiments.drawing import random_roads, random_trial
 from experiments.free_flow import free_flow
 

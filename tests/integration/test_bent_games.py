@@ -11,7 +11,6 @@ import pytest
 from experiments.synthesized import Events, instance
 
 from dubins_traffic.cars.state import Pose
-from dubins_traffic.controllers.synthesized import STRATEGY_LEFT, Synthesized
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
@@ -24,6 +23,7 @@ from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.road_play import UNKNOWN_MOVE, Ground
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
+from dubins_traffic.synthesis.synthesized import STRATEGY_LEFT, Synthesized
 from tests.chain_reference import RING, SNAKE, Track
 
 pytestmark = pytest.mark.path

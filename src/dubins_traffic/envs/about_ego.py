@@ -9,8 +9,8 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.envs.step_kernel import StepTables, count_tick
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.observations.flat_kernel import near_far, sweep, within, write_bearing, write_flat
-from dubins_traffic.observations.outlook import OutlookTables
+from dubins_traffic.learning.flat_kernel import near_far, sweep, within, write_bearing, write_flat
+from dubins_traffic.learning.outlook import OutlookTables
 
 NAMES = (
     "is_ego", "bearing_cos", "bearing_sin", "distance", "heading_cos", "heading_sin", "speed", "yaw_rate",

@@ -13,7 +13,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import Frames, Observation
-from dubins_traffic.observations.flat import FlatObserver
+from dubins_traffic.learning.flat import FlatObserver
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.scoring.formulas import FormulaVerdicts, Status

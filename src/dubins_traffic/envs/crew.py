@@ -24,7 +24,7 @@ from dubins_traffic.envs.terms import AT_FAULT, PARTS
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
-from dubins_traffic.observations.outlook import new_outlook
+from dubins_traffic.learning.outlook import new_outlook
 from dubins_traffic.observations.viewpoints import Viewpoints
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.problem.kinds import REMOTE

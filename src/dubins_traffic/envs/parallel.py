@@ -19,7 +19,7 @@ from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import Pay
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.observations.flat import SHOWN
+from dubins_traffic.learning.flat import SHOWN
 from dubins_traffic.problem.kinds import KEEP_RULES
 from dubins_traffic.protocols import End
 from dubins_traffic.shield.tables import Overtakes, check_overtakes
@@ -27,10 +27,10 @@ from dubins_traffic.shield.tables import Overtakes, check_overtakes
 if TYPE_CHECKING:
     import os
 
+    from dubins_traffic.animation.raster_kernel import Image
     from dubins_traffic.envs.episodes import Levels
     from dubins_traffic.problem.configuration import Configuration
     from dubins_traffic.problem.instance import Instance
-    from dubins_traffic.viewer.raster_kernel import Image
 
 Flags = dict[str, bool]
 
@@ -122,7 +122,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         self._episode = 0
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
-        """Return the space of an agent's observations: `observations.flat`, then `envs.about_ego.NAMES`."""
+        """Return the space of an agent's observations: `learning.flat`, then `envs.about_ego.NAMES`."""
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> spaces.Space[Any]:

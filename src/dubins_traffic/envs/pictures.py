@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from dubins_traffic.animation.live import LiveView
+from dubins_traffic.animation.raster import NO_MARKS, Raster
+from dubins_traffic.animation.raster_kernel import MARKS, Image
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.errors import InputError
 from dubins_traffic.rules.referee import accused
-from dubins_traffic.viewer.live import LiveView
-from dubins_traffic.viewer.raster import NO_MARKS, Raster
-from dubins_traffic.viewer.raster_kernel import MARKS, Image
 
 if TYPE_CHECKING:
     from dubins_traffic.engine.group import Group
     from dubins_traffic.envs.fleet import Fleet
     from dubins_traffic.kernels.arrays import Floats
-    from dubins_traffic.observations.outlook import OutlookTables
+    from dubins_traffic.learning.outlook import OutlookTables
     from dubins_traffic.problem.instance import Problem
 
 MODES: Final = ("rgb_array", "human")

@@ -17,7 +17,7 @@ from dubins_traffic.envs.episodes import Episodes, Levels
 from dubins_traffic.envs.terms import weights_of
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.observations.flat import SHOWN, Layout
+from dubins_traffic.learning.flat import SHOWN, Layout
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.instance import Instance
 

@@ -14,7 +14,7 @@ from dubins_traffic.envs.pictures import MODES, SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.spaces import info_of_one, observed, space_of
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.observations.flat import SHOWN
+from dubins_traffic.learning.flat import SHOWN
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.shield.tables import Overtakes, check_overtakes
 

@@ -14,7 +14,7 @@ from dubins_traffic.kernels.arrays import Floats
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from dubins_traffic.observations.flat import Layout
+    from dubins_traffic.learning.flat import Layout
 
 
 class ObservationSpace(spaces.Space[Observation]):

@@ -15,9 +15,9 @@ from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints, fetch
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
 from dubins_traffic.kernels.records import Rows, record
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.observations.flat_kernel import sweep, within, write_flat
-from dubins_traffic.observations.outlook import OutlookTables
-from dubins_traffic.observations.seeking import metres_to_goal, seek
+from dubins_traffic.learning.flat_kernel import sweep, within, write_flat
+from dubins_traffic.learning.outlook import OutlookTables
+from dubins_traffic.learning.seeking import metres_to_goal, seek
 from dubins_traffic.rules.breach_log import RULE
 from dubins_traffic.rules.fault import blamed, in_breach
 from dubins_traffic.rules.label_cache import growth_row

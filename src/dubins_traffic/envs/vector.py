@@ -17,7 +17,7 @@ from dubins_traffic.envs.pictures import MODES, SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.spaces import StepInfo, observed, space_of
 from dubins_traffic.errors import DubinsTrafficError, InputError
-from dubins_traffic.observations.flat import SHOWN
+from dubins_traffic.learning.flat import SHOWN
 
 if TYPE_CHECKING:
     import os

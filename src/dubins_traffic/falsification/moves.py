@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 
-from dubins_traffic.agents import choices, whims
+from dubins_traffic.agents import choices
 from dubins_traffic.agents.choices import CHOICE
 from dubins_traffic.cars.state import EGO, Pose
+from dubins_traffic.falsification import whims
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.starts import Ground, areas_of, gap_radius
 
@@ -35,7 +36,7 @@ class Genome:
     tables: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
     """Shape (K, 7) each. What each e-agent chooses (`agents.choices`), by the cars' numbers."""
     whims: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
-    """Shape (K, 5) each. What each free e-agent likes to do (`agents.whims`), by the cars' numbers."""
+    """Shape (K, 5) each. What each free e-agent likes to do (`falsification.whims`), by the cars' numbers."""
 
     @property
     def choosing(self) -> list[int]:

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dubins_traffic.agents import choices, whims
-from dubins_traffic.falsification import moves
+from dubins_traffic.agents import choices
+from dubins_traffic.falsification import moves, whims
 from dubins_traffic.falsification.contract import CAPRICIOUS
 from dubins_traffic.falsification.moves import Genome
 from dubins_traffic.problem.configuration import Configuration

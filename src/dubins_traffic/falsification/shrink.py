@@ -7,10 +7,11 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, Final
 
-from dubins_traffic.agents import choices, whims
+from dubins_traffic.agents import choices
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
+from dubins_traffic.falsification import whims
 from dubins_traffic.falsification.case import (
     Case,
     Judged,

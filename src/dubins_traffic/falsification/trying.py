@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 
 from dubins_traffic.campaign.chunks import fitting
+from dubins_traffic.campaign.ray_crew import check_address, crew_at
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.controllers import named
 from dubins_traffic.controllers import registry as controllers
@@ -24,7 +25,6 @@ from dubins_traffic.record.reader import Record, replay
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.runs.crew import Cancelled, Crew, carry_out
-from dubins_traffic.runs.ray_crew import check_address, crew_at
 from dubins_traffic.scoring.margins import LIVENESS
 from dubins_traffic.scoring.score import Score, score
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Ruling

@@ -65,8 +65,8 @@ def program_of(spec: str) -> Program:
         return _python(f"{PLACE}/{path.name}", Shown(str(path), f"{PLACE}/{path.name}", own=True))
     if outside.is_place(spec):
         return _module(spec)
-    if spec not in registry.names() or spec == "keyboard":
-        expected = f"{EXPECTED}; built in: {', '.join(sorted(set(registry.names()) - {'keyboard'}))}"
+    if spec not in registry.names():
+        expected = f"{EXPECTED}; built in: {', '.join(sorted(registry.names()))}"
         raise InputError("can't drive in a box", file="--controller", value=spec, expected=expected)
     return _python(spec)
 

@@ -15,9 +15,9 @@ from typing import Any
 
 import structlog
 
+from dubins_traffic.campaign.ray_crew import check_address
+from dubins_traffic.campaign.ray_driver import PACKAGE, join
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.runs.ray_crew import check_address
-from dubins_traffic.runs.ray_driver import PACKAGE, join
 from dubins_traffic.service import logs
 from dubins_traffic.service.client import Connection
 from dubins_traffic.service.worker import Worker, default_folder

@@ -233,7 +233,7 @@ TRANSPORTS: dict[str, TransportEntry] = {
                 metavar="COMMAND",
                 shown="required",
             ),
-            Option("--sandbox", bool, "It runs in a box (docs/sandbox.md).", default=False),
+            Option("--sandbox", bool, "It runs in a box.", default=False),
         ),
     ),
 }

@@ -16,6 +16,7 @@ from typing import Any, Final
 
 from pydantic import ValidationError
 
+from dubins_traffic.above import ABOVE
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.manifest import hash_of_file
 from dubins_traffic.campaign.report.plots import figures
@@ -31,7 +32,6 @@ from dubins_traffic.record.header import bare_name
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.jobs import Job, run_trials
-from dubins_traffic.sandbox.available import available_layers
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.scoring.registry import STRATEGY_SHARE
@@ -429,8 +429,6 @@ def seated(specs: Sequence[str]) -> tuple[list[str], str]:
     ]
     if not strangers:
         return list(specs), ""
-    try:
-        available_layers().require()
-    except InputError as error:
-        return list(specs), f"{', '.join(strangers)}: in process, trusted, since {error.problem}"
+    if reason := ABOVE.why_no_boxes():
+        return list(specs), f"{', '.join(strangers)}: in process, trusted, since {reason}"
     return [controllers_by_name.sandboxed(spec) if spec in strangers else spec for spec in specs], ""

@@ -16,7 +16,6 @@ from itertools import combinations, permutations
 from typing import Final
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.logic.exports import FORMATS, Specification
 from dubins_traffic.logic.formula import (
     Formula,
     Op,
@@ -31,6 +30,7 @@ from dubins_traffic.logic.formula import (
     prop,
 )
 from dubins_traffic.logic.rewrite import simplify
+from dubins_traffic.specifications.exports import FORMATS, Specification
 from dubins_traffic.synthesis.assumption import Arriving, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board
 
@@ -42,7 +42,7 @@ MOST_CARS: Final = 4
 
 
 FORMS: Final = {".structuredslugs": "slugs", ".tlsf": "tlsf", ".py": "tulip"}
-"""Endings of files of specifications, and the formats of `logic.exports` that they stand for."""
+"""Endings of files of specifications, and the formats of `specifications.exports` that they stand for."""
 
 
 def specification_text(board: Board, starts: Sequence[int], ending: str) -> str:

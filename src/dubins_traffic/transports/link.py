@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
+from dubins_traffic.cars.state import EGO, Command, Contact, Labels, Observation, State
 from dubins_traffic.errors import InputError, PeerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.observations.senses import Senses
@@ -23,6 +24,7 @@ from dubins_traffic.protocols import (
     Clock,
     Closes,
     Controller,
+    Driver,
     End,
     Ending,
     Looks,
@@ -37,6 +39,7 @@ from dubins_traffic.transports.inbox import Inbox, Punctuality, Slot
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
+    from dubins_traffic.record.wall import Wall
 
 EGO_NAME = "ego"
 IDLE = 0.1
@@ -94,7 +97,14 @@ class Link:
         self.inbox.expect(self._remote)
         self.transport.begin(instance, self._remote)
 
-    def watch(self, tick: int, state: State, labels: Labels, observe: Callable[[], Observation]) -> None:
+    def watch(
+        self,
+        tick: int,
+        state: State,
+        labels: Labels,
+        contacts: Sequence[Contact],  # noqa: ARG002  # drivers are sent poses and labels
+        observe: Callable[[], Observation],
+    ) -> None:
         """Send frame `tick` when it is due."""
         if self._running:
             due = self.clock.due(tick)
@@ -167,6 +177,29 @@ class Link:
     def close(self) -> None:
         """Close the transport."""
         self.transport.close()
+
+    @property
+    def name(self) -> str:
+        """Name of the transport."""
+        return self.transport.name
+
+    def controller(self) -> Controller:
+        """Return the ego's driver elsewhere."""
+        return RemoteController(self)
+
+    def beside(self, controller: Controller) -> Controller:
+        """Return a controller of this process whose start tells the peers that the trial begins."""
+        return LocalController(self, controller)
+
+    def agents(self) -> Driver:
+        """Return the driver of the e-agents that are driven elsewhere."""
+        return RemoteAgents(self)
+
+    def completed(self, measured: Wall) -> Wall:
+        """Return the wall-clock figures of the trial with those of the link."""
+        begin = self.time_to_begin if self.ego else measured.time_to_begin_s
+        reproducible = measured.reproducible and self.clock.lockstep
+        return replace(measured, time_to_begin_s=begin, reproducible=reproducible, transport=self.report())
 
     @property
     def running(self) -> bool:

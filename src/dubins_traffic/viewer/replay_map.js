@@ -212,7 +212,7 @@ class MapView {
     const { context: c, trial, pixel } = this;
     const [frame] = trial.place(time);
     const reach = TRAIL_SECONDS * trial.rate;
-    const base = car * trial.frames;
+    const base = car * trial.stride;
     const pose = trial.pose(car, time);
     c.strokeStyle = trial.cars[car].colour;
     c.lineCap = "butt";
