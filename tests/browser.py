@@ -1,4 +1,4 @@
-"""A real browser for tests of pages: headless Chromium, with the log of its console."""
+"""A real browser for tests of pages: headless Chromium, with the log of its console, and what axe finds there."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from selenium import webdriver
 
 from tests.tools import need_programs
 
+AXE = Path(__file__).with_name("vendor") / "axe.min.js"
 FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
     "--disable-component-update --disable-sync"
@@ -39,3 +40,38 @@ def browsing(
         yield driver
     finally:
         driver.quit()
+
+
+def faults(browser: webdriver.Chrome, *rules: str) -> list[str]:
+    """Return what axe finds of the page that is serious; with `rules`, by these alone."""
+    browser.execute_script(AXE.read_text(encoding="utf-8"))
+    only = {"runOnly": {"type": "rule", "values": rules}} if rules else {}
+    found = browser.execute_async_script(
+        "const done = arguments[arguments.length - 1];"
+        "axe.run({iframes: false, ...arguments[0]}).then(r => done(r.violations))",
+        only,
+    )
+    return [
+        f"{one['id']}: {one['nodes'][0]['html'][:200]}"
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]
+
+
+def dark(browser: webdriver.Chrome, on: bool) -> None:
+    """Let the browser say that its reader wants dark pages, or light ones."""
+    features = [{"name": "prefers-color-scheme", "value": "dark" if on else "light"}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+
+def widen(browser: webdriver.Chrome, width: int, height: int = 800) -> None:
+    """Give the page so many pixels; below 600 as on a telephone."""
+    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def sideways(browser: webdriver.Chrome) -> int:
+    """Return by how many pixels the page is wider than its window."""
+    return browser.execute_script(
+        "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    )
