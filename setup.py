@@ -49,7 +49,7 @@ class WithCommit(build_py):
             return
         package = Path(self.build_lib) / "dubins_traffic"
         (package / NAME).write_text(commit(), encoding="ascii")
-        shutil.copy(HERE / "scripts" / INSTALLER, package / "simulators" / "gazebo")
+        shutil.copy(HERE / "scripts" / INSTALLER, package / "gazebo")
         shutil.copy(HERE / NORM, package / "rules")
         shutil.rmtree(package / "machine", ignore_errors=True)  # of a wheel that was built here before
         if MACHINE:

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import Row
+from dubins_traffic.animation.raster import Raster
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
@@ -23,7 +24,6 @@ from dubins_traffic.problem.instance import Problem
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.bodies import nose, outline
 from dubins_traffic.viewer.canvas import Canvas
-from dubins_traffic.viewer.raster import Raster
 
 SIDE, CARS, FRAMES, PLOTTED, ROUNDS = 400, 8, 2000, 20, 5
 LEAST, TIMES = 2000.0, 10.0
@@ -68,11 +68,11 @@ def measure() -> list[Row]:
 
 def _minute() -> list[Row]:
     """Return the rows of a GIF of a minute; Pillow is given the same pictures, and ours is timed with painting them."""
+    from dubins_traffic.viewer.animate import FPS, animate
     from PIL import Image
 
     from dubins_traffic.record.reader import read
     from dubins_traffic.runs.single import run_trial
-    from dubins_traffic.viewer.animate import FPS, animate
 
     with TemporaryDirectory() as folder:
         record, ours, theirs = (Path(folder) / name for name in ("trial.mcap", "ours.gif", "theirs.gif"))

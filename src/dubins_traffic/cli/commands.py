@@ -24,6 +24,7 @@ from dubins_traffic.cli import (
     listing,
     messages,
     network,
+    play,
     plot,
     replay,
     run,
@@ -37,6 +38,7 @@ from dubins_traffic.cli import (
     synth,
     template,
     verify,
+    watch,
     worker,
 )
 from dubins_traffic.sessions.registry import TRANSPORTS
@@ -80,6 +82,8 @@ def _options(  # pyright: ignore[reportUnusedFunction]
 app.command("network", epilog=network.EXAMPLES)(network.network)
 app.command("instance", epilog=instance.EXAMPLES)(instance.instance)
 app.command("run", epilog=run.EXAMPLES)(run.run)
+app.command("watch", epilog=watch.EXAMPLES)(watch.watch)
+app.command("play", epilog=play.EXAMPLES)(play.play)
 app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
 app.command("score", epilog=score.EXAMPLES)(score.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)

@@ -163,6 +163,23 @@ Source = Annotated[
         autocompletion=shipped,
     ),
 ]
+Pace = Annotated[
+    float, typer.Option("--pace", metavar="X", help="Seconds of the trial in a second, in the page.")
+]
+Port = Annotated[
+    int,
+    typer.Option(
+        "--port",
+        metavar="P",
+        min=0,
+        max=65535,
+        help="Port of the page, on this machine only.",
+        show_default="one that is free",
+    ),
+]
+NoBrowser = Annotated[
+    bool, typer.Option("--no-browser", help="Print the address of the page, and open no browser.")
+]
 Record = Annotated[str, typer.Argument(metavar="RECORD", help="A record, `*.mcap`.", show_default=False)]
 
 

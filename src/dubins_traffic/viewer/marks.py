@@ -147,16 +147,20 @@ def goal_visits(instance: Instance, frames: Frames) -> list[tuple[int, int]]:
     return [(int(frame), int(at[frame])) for frame in np.flatnonzero(entry)]
 
 
+def visit_mark(problem: Problem, time: float, vertex: int) -> Mark:
+    """Return the mark of a visit of the goal at intersection `vertex`, by its number there."""
+    network = problem.network
+    x, y = network.intersections[vertex]
+    place = (float(network.points[vertex, 0]), float(network.points[vertex, 1]))
+    text = f"ego visits goal {goal_numbers(problem)[vertex]} at ({short(x)}, {short(y)})"
+    return Mark(time, "goal", text, EGO, place)
+
+
 def marks_of(instance: Instance, frames: Frames, more: Sequence[Mark] = ()) -> list[Mark]:
     """Return all marks of a trial in order of time: contacts, events, visits of goals and `more`."""
     marks = [contact_mark(instance, contact) for contact in frames.contacts]
     marks += event_marks(instance, frames)
-    points, lattice = instance.problem.network.points, instance.problem.network.intersections
-    numbers = goal_numbers(instance.problem)
     for frame, vertex in goal_visits(instance, frames):
-        x, y = lattice[vertex]
-        place = (float(points[vertex, 0]), float(points[vertex, 1]))
-        text = f"ego visits goal {numbers[vertex]} at ({short(x)}, {short(y)})"
-        marks.append(Mark((frames.first + frame) / frames.rate, "goal", text, EGO, place))
+        marks.append(visit_mark(instance.problem, (frames.first + frame) / frames.rate, vertex))
     marks += more
     return sorted(marks, key=lambda mark: mark.time)
