@@ -1,4 +1,4 @@
-"""A real browser for tests of pages: headless Chromium, with the log of its console."""
+"""A real browser for tests of pages: headless Chromium, with the log of its console, and what axe finds there."""
 
 from __future__ import annotations
 
@@ -53,3 +53,22 @@ def faults(browser: webdriver.Chrome) -> list[str]:
         for one in found
         if one["impact"] in ("serious", "critical")
     ]
+
+
+def dark(browser: webdriver.Chrome, on: bool) -> None:
+    """Let the browser say that its reader wants dark pages, or light ones."""
+    features = [{"name": "prefers-color-scheme", "value": "dark" if on else "light"}]
+    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+
+
+def widen(browser: webdriver.Chrome, width: int, height: int = 800) -> None:
+    """Give the page so many pixels; below 600 as on a telephone."""
+    size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+
+
+def sideways(browser: webdriver.Chrome) -> int:
+    """Return by how many pixels the page is wider than its window."""
+    return browser.execute_script(
+        "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
+    )

@@ -30,7 +30,7 @@ from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.scoring.columns import REPORTED, SCORES
-from tests.browser import browsing
+from tests.browser import browsing, dark, faults, widen
 from tests.campaigns import campaign, written
 
 TEN = {
@@ -186,8 +186,7 @@ def test_the_page_in_a_browser(folder: Path, browser: webdriver.Chrome) -> None:
 def test_letters_of_charts_are_as_large_as_those_of_the_page(
     width: int, folder: Path, browser: webdriver.Chrome
 ) -> None:
-    size = {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": width < 600}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    widen(browser, width)
     browser.get((folder / "report" / "index.html").as_uri())
     open_all(browser)
     sizes = browser.execute_script(
@@ -212,17 +211,17 @@ def test_the_page_is_dark_where_it_should_be_and_nothing_scrolls_sideways(
     folder: Path, browser: webdriver.Chrome
 ) -> None:
     for scheme, is_ground in (("dark", range(60)), ("light", range(200, 256))):
-        features = [{"name": "prefers-color-scheme", "value": scheme}]
-        browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+        dark(browser, scheme == "dark")
         browser.get((folder / "report" / "index.html").as_uri())
+        open_all(browser)
+        assert faults(browser) == []
         shot = browser.find_element(By.CSS_SELECTOR, "section img").screenshot_as_png
         pixels = np.asarray(Image.open(BytesIO(shot)).convert("L"))
         assert int(np.median(pixels[:3])) in is_ground
         assert abs(int(pixels.max()) - int(pixels.min())) > 150
         ink = browser.execute_script("return getComputedStyle(document.querySelector('td')).color")
         assert (sum(map(int, re.findall(r"\d+", ink)[:3])) > 384) == (scheme == "dark")
-    size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    widen(browser, 400)
     browser.get((folder / "report" / "index.html").as_uri())
     open_all(browser)
     wide = browser.execute_script(

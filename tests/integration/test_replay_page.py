@@ -12,13 +12,14 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
+import dubins_traffic as dt
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer.marks import Mark
 from dubins_traffic.viewer.replay import write_replay
-from tests.browser import browsing
+from tests.browser import browsing, dark, faults, sideways, widen
 from tests.pages import ask, element, has_colour, press
 from tests.synthetic import ROUGH, driven, instance, obstacles_beside, verdict
 
@@ -97,6 +98,42 @@ def test_a_page_begins_at_the_second_that_it_is_told(
     )
     assert (ask(browser, "time"), ask(browser, "playing")) == (12.5, False)
     assert browser.get_log("browser") == []
+
+
+def test_an_exported_notebook_plays_a_record(
+    browser: webdriver.Chrome, trial: tuple[Instance, Frames], tmp_path: Path
+) -> None:
+    """Of nothing but what the record shows of itself: its picture changes as it plays, and nothing is loaded."""
+    tried, frames = trial
+    record = dt.Record(tried, frames, (frames,), Ending(End.DURATION, len(frames) - 1), "none", {})
+    exported = tmp_path / "notebook.html"
+    text = f"<!DOCTYPE html><html lang=en><title>Notebook</title><body>{record._repr_html_()}</body></html>"
+    exported.write_text(text, encoding="utf-8")
+    browser.get(exported.as_uri())
+    browser.switch_to.frame(browser.find_element(By.TAG_NAME, "iframe"))
+    WebDriverWait(browser, 600).until(
+        lambda driver: driver.execute_script("return window.replay?.ready === true")
+    )
+    before, begun = browser.execute_script(PICTURE), ask(browser, "time")
+    element(browser, "play").click()
+    WebDriverWait(browser, 600).until(lambda driver: ask(driver, "time") > begun + 0.5)
+    assert browser.execute_script(PICTURE) != before
+    assert browser.execute_script("return window.broken === undefined")
+    browser.switch_to.default_content()
+    assert browser.get_log("browser") == []
+
+
+@pytest.mark.parametrize("on", [False, True])
+def test_the_page_has_no_serious_fault_by_axe(page: webdriver.Chrome, on: bool) -> None:
+    try:
+        for width in (1280, 400):
+            widen(page, width)
+            dark(page, on)
+            assert faults(page) == []
+            assert sideways(page) <= 0
+    finally:
+        dark(page, False)
+        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
 def test_opens_and_shows_the_trial(page: webdriver.Chrome, trial: tuple[Instance, Frames]) -> None:

@@ -12,7 +12,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.browser import browsing, faults
+from tests.browser import browsing, dark, faults
 from tests.services import CRASHING, PASSWORD, STANDING, Service, competition_text, serving
 
 pytestmark = pytest.mark.tools("browser")
@@ -53,11 +53,6 @@ def login(browser: webdriver.Chrome, service: Service, name: str) -> None:
     browser.get(f"{service.url}/login")
     fill(browser, name=name, password=PASSWORD)
     WebDriverWait(browser, WAIT_S).until(lambda _: browser.current_url == f"{service.url}/")
-
-
-def dark(browser: webdriver.Chrome, on: bool) -> None:
-    features = [{"name": "prefers-color-scheme", "value": "dark" if on else "light"}]
-    browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
 
 
 def test_a_participant_from_the_invitation_to_the_replay(
