@@ -27,10 +27,10 @@ from benchmarks.batch import configuration
 from benchmarks.table import Row
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.ray_crew import crew_at
 from dubins_traffic.campaign.run_campaign import run_campaign, run_left
 from dubins_traffic.runs.crew import Crew
 from dubins_traffic.runs.jobs import Job, run_trials
-from dubins_traffic.runs.ray_crew import crew_at
 
 TRIALS = 20_000
 BARE = 2_000

@@ -25,6 +25,9 @@ from benchmarks.table import Row
 from dubins_traffic.cars.body import Car
 from dubins_traffic.cars.state import EGO, Frames, Pose
 from dubins_traffic.errors import InputError
+from dubins_traffic.gazebo.prefix import Installation, find
+from dubins_traffic.gazebo.simulator import Gazebo
+from dubins_traffic.gazebo.world import world
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw
@@ -33,9 +36,6 @@ from dubins_traffic.record.sink import Ending
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score
 from dubins_traffic.simulators.embedded import Embedded
-from dubins_traffic.simulators.gazebo.prefix import Installation, find
-from dubins_traffic.simulators.gazebo.simulator import Gazebo
-from dubins_traffic.simulators.gazebo.world import world
 
 RATE = 30
 TICKS = 10 * RATE

@@ -14,7 +14,7 @@ from dubins_traffic.logic.formula import propositions
 from dubins_traffic.logic.monitor import Monitors
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.rules.task import task
+from dubins_traffic.specifications.task import task
 
 FRAMES, TURNS = 300, 5
 BAR = 1e7

@@ -16,13 +16,13 @@ from benchmarks.rates import BATCH, MOTION, WORLD, Rate
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.gazebo.simulator import Gazebo
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.runs.single import Trial
 from dubins_traffic.simulators.embedded import Embedded
-from dubins_traffic.simulators.gazebo.simulator import Gazebo
 
 GRIDS = {8: (4, 5), 64: (10, 16)}
 """Rows and columns of the grid for so many cars, about 2.5 intersections a car."""

@@ -22,11 +22,11 @@ from typing import Any
 from benchmarks.table import Row, show
 
 from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.maps.reduction import Reduction
+from dubins_traffic.maps.sumo import SumoNet
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.roads.formats.sumo import SumoNet
-from dubins_traffic.roads.maps.reduction import Reduction
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial
 

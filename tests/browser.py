@@ -11,6 +11,7 @@ from selenium import webdriver
 
 from tests.tools import need_programs
 
+AXE = Path(__file__).parent / "vendor" / "axe.min.js"
 FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
     "--disable-component-update --disable-sync"
@@ -39,3 +40,16 @@ def browsing(
         yield driver
     finally:
         driver.quit()
+
+
+def faults(browser: webdriver.Chrome) -> list[str]:
+    """Return what axe finds of the page that is serious."""
+    browser.execute_script(AXE.read_text(encoding="utf-8"))
+    found = browser.execute_async_script(
+        "const done = arguments[arguments.length - 1]; axe.run({iframes: false}).then(r => done(r.violations))"
+    )
+    return [
+        f"{one['id']}: {one['nodes'][0]['html'][:200]}"
+        for one in found
+        if one["impact"] in ("serious", "critical")
+    ]

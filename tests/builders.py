@@ -14,7 +14,7 @@ def builders(cache: Path) -> list[int]:
         with suppress(OSError):
             around = (folder / "environ").read_bytes().split(b"\0")
             ours = f"NUMBA_CACHE_DIR={cache}".encode() in around
-            if ours and b"kernels.builder" in (folder / "cmdline").read_bytes():
+            if ours and b"compiling.builder" in (folder / "cmdline").read_bytes():
                 found.append(int(folder.name))
     return found
 

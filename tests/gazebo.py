@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.simulators.gazebo.prefix import Installation, find
+from dubins_traffic.gazebo.prefix import Installation, find
 from tests.tools import need
 
 

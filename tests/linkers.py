@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from dubins_traffic.compiling import linking
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels import linking
 from tests import tools
 
 

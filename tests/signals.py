@@ -1,4 +1,4 @@
-"""What the formulas of `rules.task` say of a recorded trial: when each is first broken, and its last verdict."""
+"""What the formulas of `specifications.task` say of a recorded trial: when each is broken first, and the verdict."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from dubins_traffic.logic.monitor import Monitors
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach
-from dubins_traffic.rules.task import task
 from dubins_traffic.rules.valuation import Valuation
 from dubins_traffic.scoring.verdict import first_fall
+from dubins_traffic.specifications.task import task
 
 Key: TypeAlias = tuple[str, int, int]
 """A rule, a car and an intersection (-1: none)."""

@@ -44,8 +44,8 @@ GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
         (
             "envs.single.TrafficEnv", "envs.vector.TrafficVectorEnv", "envs.shielded_ego.ShieldedEgo",
             "envs.parallel.parallel_env", "envs.parallel.TrafficParallelEnv", "envs.shielded.Shielded",
-            "observations.flat.Layout", "observations.flat.FlatObserver", "controllers.learned.Policy",
-            "viewer.raster.Raster",
+            "learning.flat.Layout", "learning.flat.FlatObserver", "learning.policy.Policy",
+            "animation.raster.Raster",
         ),
     ),
     "sandbox": ("Boxes", tuple(f"sandbox.{name}" for name in sandbox.__all__)),

@@ -20,9 +20,9 @@ import numpy as np
 
 import dubins_traffic.envs  # noqa: F401  # makes its environments known
 from dubins_traffic import load_config
-from dubins_traffic.controllers.learned import Policy
 from dubins_traffic.envs.terms import COSTS
-from dubins_traffic.observations.flat import Layout
+from dubins_traffic.learning.flat import Layout
+from dubins_traffic.learning.policy import Policy
 
 HERE = Path(__file__).parent
 PAIRS, SIGMA, RATE, SEED, SKIP, CARS = 48, 0.1, 0.05, 1, 5, 2

@@ -8,11 +8,14 @@ from __future__ import annotations
 from importlib import import_module
 
 from dubins_traffic.above import ABOVE
+from dubins_traffic.moved import keep_earlier_names
 
 TYPE_CHECKING = False
 if TYPE_CHECKING:  # without the module `typing`: the program `dubins-traffic` hears Ctrl-C the sooner
+    from collections.abc import Callable, Mapping
     from typing import Any
 
+    from dubins_traffic.animation.animate import Animation, animate
     from dubins_traffic.campaign.results import CampaignResults, load_results
     from dubins_traffic.campaign.run_campaign import run_campaign
     from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
@@ -53,7 +56,6 @@ if TYPE_CHECKING:  # without the module `typing`: the program `dubins-traffic` h
     from dubins_traffic.scoring.verdict import Verdict
     from dubins_traffic.verification.result import Difference, Verification
     from dubins_traffic.verification.verify import verify
-    from dubins_traffic.viewer.animate import Animation, animate
     from dubins_traffic.viewer.plot import plot, write_plot
     from dubins_traffic.viewer.replay import write_replay
 
@@ -98,10 +100,26 @@ _PLACES = {
     "scoring.verdict": ("Verdict",),
     "verification.result": ("Difference", "Verification"),
     "verification.verify": ("verify",),
-    "viewer.animate": ("Animation", "animate"),
+    "animation.animate": ("Animation", "animate"),
     "viewer.plot": ("plot", "write_plot"),
     "viewer.replay": ("write_replay",),
 }
+_PARTS = {
+    "map formats": {
+        "commonroad": "maps.commonroad:CommonRoad",
+        "lanelet2": "maps.lanelet2:Lanelet2",
+        "osm": "maps.osm:OpenStreetMap",
+        "opendrive": "maps.opendrive:OpenDrive",
+        "sumo": "maps.sumo:SumoNet",
+    },
+    "simulators": {"gazebo": "gazebo.simulator:Gazebo"},
+    "controllers": {
+        "learned": "learning.policy",
+        "synthesized": "synthesis.synthesized",
+    },
+    "e-agents": {"counter": "synthesis.counter_team:CounterTeam"},
+}
+"""What rooms above a registry add to it, by name: a module, and a class in it; map formats in the order of asking."""
 _NAMES = {
     entry.partition("=")[0]: (place, entry.rpartition("=")[2])
     for place in _PLACES
@@ -219,7 +237,38 @@ def _boxed(spec: str, limits: str) -> Any:
     return named(spec, limits)
 
 
-ABOVE.html_of, ABOVE.rows_of, ABOVE.boxed = _html_of, _rows_of, _boxed
+def _compiled(kernel: Any, kinds: Any) -> Any:
+    from dubins_traffic.compiling.beside import sought
+
+    return sought(kernel, kinds)
+
+
+def _why_no_boxes() -> str:
+    from dubins_traffic.errors import InputError
+    from dubins_traffic.sandbox.available import available_layers
+
+    try:
+        available_layers().require()
+    except InputError as error:
+        return error.problem
+    return ""
+
+
+def _parts(registry: str) -> Mapping[str, Callable[[], Any]]:
+    from functools import partial
+
+    return {name: partial(_part, place) for name, place in _PARTS[registry].items()}
+
+
+def _part(place: str) -> Any:
+    module, _, name = place.partition(":")
+    found = import_module(f"{__name__}.{module}")
+    return getattr(found, name) if name else found
+
+
+ABOVE.html_of, ABOVE.rows_of, ABOVE.compiled = _html_of, _rows_of, _compiled
+ABOVE.boxed, ABOVE.why_no_boxes, ABOVE.parts = _boxed, _why_no_boxes, _parts
+keep_earlier_names()
 
 
 def __dir__() -> list[str]:

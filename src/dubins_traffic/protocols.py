@@ -15,6 +15,7 @@ from dubins_traffic.cars.state import Command, Contact, Labels, Observation, Pos
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.record.sink import End, Ending, Sink
+from dubins_traffic.record.wall import Wall
 
 __all__ = [
     "Capabilities",
@@ -26,6 +27,7 @@ __all__ = [
     "End",
     "Ending",
     "Forks",
+    "Link",
     "Looks",
     "Mailbox",
     "Polled",
@@ -166,10 +168,18 @@ class Watcher(Protocol):
         """Begin a trial whose cars have been placed; `watch` with frame 0 follows."""
         ...
 
-    def watch(self, tick: int, state: State, labels: Labels, observe: Callable[[], Observation]) -> None:
+    def watch(
+        self,
+        tick: int,
+        state: State,
+        labels: Labels,
+        contacts: Sequence[Contact],
+        observe: Callable[[], Observation],
+    ) -> None:
         """Look at frame `tick`, just reached; the arrays (1, N) are the simulator's own and change in the next tick.
 
-        `observe` returns the ego's observation of this frame; it is made once, however often it is called.
+        `contacts` are those of the tick that led there, `at_fault` filled in. `observe` returns the ego's observation
+        of this frame; it is made once, however often it is called.
 
         Raises
         ------
@@ -306,6 +316,40 @@ class Looks(Protocol):
 
     def look(self) -> None:
         """Tell the mailbox which peers have connected and which have gone since the last look."""
+        ...
+
+
+class Link(Watcher, Protocol):
+    """One trial's connection to drivers in other processes: it shows them frames, and stands for them in the trial."""
+
+    @property
+    def ego(self) -> bool:
+        """Whether the ego is driven elsewhere."""
+        ...
+
+    @property
+    def name(self) -> str:
+        """Name of the transport; stands in the record as the controller's if the ego is driven elsewhere."""
+        ...
+
+    def controller(self) -> Controller:
+        """Return the ego's driver elsewhere."""
+        ...
+
+    def beside(self, controller: Controller) -> Controller:
+        """Return `controller`, of this process, as one whose start tells the programs elsewhere that a trial begins."""
+        ...
+
+    def agents(self) -> Driver:
+        """Return the driver of the e-agents that are driven elsewhere."""
+        ...
+
+    def finish(self, ending: Ending) -> None:
+        """Tell the programs elsewhere that the trial is over."""
+        ...
+
+    def completed(self, measured: Wall) -> Wall:
+        """Return the wall-clock figures of the trial with those of the link."""
         ...
 
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import ast
 import re
-import tomllib
 from collections.abc import Callable, Mapping
 
 import grimp
 
+from tests.architecture.buildings import town
 from tests.architecture.constants import constants
-from tests.architecture.house import ROOT, Findings, Module, modules
+from tests.architecture.house import Findings, Module, modules
 from tests.architecture.kernels import kernels_without_units, wide_kernels
 
 MOST_LINES = 700
@@ -49,10 +49,8 @@ def long_modules() -> Findings:
 
 
 def imports_by_name() -> Findings:
-    """Modules of a higher room, or of one beside, that a module names in a string: so it can import them unseen."""
-    layers = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
-    rooms = [line.split(" | ") for line in layers["contracts"][0]["layers"]]
-    level = {room: number for number, line in enumerate(rooms) for room in line}
+    """Modules that a module names in a string and may not import: so it could import them unseen."""
+    found_town = town()
     known = {module.name for module in modules()}
     found: dict[str, str | int] = {}
     for module in modules():
@@ -60,10 +58,9 @@ def imports_by_name() -> Findings:
         for node in ast.walk(module.tree):
             text = node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ""
             named = re.fullmatch(r"dubins_traffic\.([\w.]+)(?::\w+)?", text)
-            if named is None or named[1] not in known or room not in level:
+            if named is None or named[1] not in known or room not in found_town.building:
                 continue
-            other = named[1].partition(".")[0]
-            if other != room and level[other] <= level[room]:
+            if not found_town.may_know(room, named[1].partition(".")[0]):
                 found[f"{module.name} -> {named[1]}"] = "by a string"
     return found
 

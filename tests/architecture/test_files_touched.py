@@ -20,8 +20,8 @@ TOUCHED = {
     ),
     "transport": (r"sessions\.stdio|run_over_stdio\b", {"sessions.registry", "sessions.stdio"}),
     "map format": (
-        r"formats\.commonroad(\"| import)|class CommonRoad\b",
-        {"roads.formats.commonroad", "roads.formats.registry"},
+        r"maps\.commonroad:|class CommonRoad\b",
+        {"", "maps.commonroad"},
     ),
 }
 """Of one of each: how files know it, and which do, two at most."""

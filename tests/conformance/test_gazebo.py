@@ -1,6 +1,6 @@
 import pytest
 
-from dubins_traffic.simulators.gazebo.simulator import Gazebo
+from dubins_traffic.gazebo.simulator import Gazebo
 from tests.conformance.simulator import SimulatorConformance
 from tests.gazebo import installation
 

@@ -12,18 +12,18 @@ import pytest
 
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
+from dubins_traffic.maps.losses import Losses
 from dubins_traffic.problem.configuration import load_config, shipped_names
 from dubins_traffic.roads.formats import registry
 from dubins_traffic.roads.formats.registry import MapFormat, ReducesMaps, WritesMaps
 from dubins_traffic.roads.generate import generate
-from dubins_traffic.roads.maps.losses import Losses
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.sources import load
 from tests.room import lacking
 
 ROOT = Path(__file__).parents[2]
 OUTSIDE = f"{ROOT / 'examples' / 'extending' / 'my_format.py'}:GridMap"
-FORMATS = [*(name for name in registry.BUILT_IN if isinstance(registry.load(name), WritesMaps)), OUTSIDE]
+FORMATS = [*(name for name in registry.names() if isinstance(registry.load(name), WritesMaps)), OUTSIDE]
 GRID = RoadNetwork.grid(2, 3)
 NETWORKS = [
     GRID,
@@ -139,7 +139,7 @@ def test_a_file_of_it_is_loaded_and_converted(form: MapFormat, tmp_path: Path) -
     found = load(file, map_format=form)
     assert isinstance(found, RoadNetwork)
     assert sorted(found.segments) == sorted(GRID.segments)
-    spec = OUTSIDE if form.name not in registry.BUILT_IN else form.name
+    spec = OUTSIDE if form.name not in registry.names() else form.name
     there, back = tmp_path / "there.json", tmp_path / f"back{form.suffixes[0]}"
     assert main(["convert", str(file), "-o", str(there), "--map-format", spec]) == 0
     assert main(["convert", str(there), "-o", str(back), "--map-format", spec]) == 0

@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dubins_traffic.logic.exports import Specification, spin, stl, tulip
 from dubins_traffic.logic.formula import SPIN, Brackets, Formula, Op, Style, subformulas, to_spin, written
 from dubins_traffic.logic.parse import parse
 from dubins_traffic.logic.rewrite import simplify, until_and_release_only
 from dubins_traffic.logic.robustness import robustness
+from dubins_traffic.specifications.exports import Specification, spin, stl, tulip
 from tests.formulas import drawn
 from tests.tools import interpreter_with, program
 

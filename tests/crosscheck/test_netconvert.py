@@ -10,8 +10,8 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from dubins_traffic.roads.formats.opendrive import OpenDrive
-from dubins_traffic.roads.maps.settings import ImportSettings
+from dubins_traffic.maps.opendrive import OpenDrive
+from dubins_traffic.maps.settings import ImportSettings
 from dubins_traffic.roads.network import RoadNetwork
 from tests.crosscheck.test_map_tools import NETWORKS, close, lanes_of
 from tests.tools import sumo_program

@@ -10,12 +10,12 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.logic import exports
-from dubins_traffic.logic.exports import Specification
 from dubins_traffic.logic.parse import parse
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.rules.task import task
+from dubins_traffic.specifications import exports
+from dubins_traffic.specifications.exports import Specification
+from dubins_traffic.specifications.task import task
 from dubins_traffic.synthesis.foreign.hoa import read_hoa
 from tests.tools import Solvers, solvers
 

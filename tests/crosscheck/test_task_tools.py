@@ -25,9 +25,9 @@ from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
-from dubins_traffic.rules.task import task
 from dubins_traffic.rules.valuation import Valuation
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.specifications.task import task
 from tests.crosscheck.test_formula_tools import asked, spin_output
 from tests.formulas import holds
 from tests.grammars import slugs_sections, tlsf_sections

@@ -9,12 +9,12 @@ import pytest
 from experiments import towns
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.maps.opendrive import OpenDrive
+from dubins_traffic.maps.sumo import SumoNet
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.protocols import End
 from dubins_traffic.roads.clearance import clearance_faults
-from dubins_traffic.roads.formats.opendrive import OpenDrive
-from dubins_traffic.roads.formats.sumo import SumoNet
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial
 from tests.minute import a_minute

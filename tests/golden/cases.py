@@ -18,12 +18,12 @@ from pyarrow import parquet
 
 import dubins_traffic as dt
 from dubins_traffic.cli.main import main as command_line
-from dubins_traffic.logic.exports import FORMATS
 from dubins_traffic.logic.formula import FormulaError
 from dubins_traffic.problem import document as documents
 from dubins_traffic.problem import draw as drawing
 from dubins_traffic.record.export import export
-from dubins_traffic.rules.task import task
+from dubins_traffic.specifications.exports import FORMATS
+from dubins_traffic.specifications.task import task
 from dubins_traffic.synthesis.answer import answer
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.transports.clocks import Lockstep

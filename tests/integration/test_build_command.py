@@ -8,11 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.checkup import building
-from dubins_traffic.checkup.building import build, entries
 from dubins_traffic.cli.main import main
+from dubins_traffic.compiling import beside, building, linking, store
+from dubins_traffic.compiling.building import build, entries
 from dubins_traffic.errors import InputError, MissingExtraError
-from dubins_traffic.kernels import beside, linking, store
 from dubins_traffic.kernels.compile import Entry
 from dubins_traffic.kernels.kinds import REAL
 from dubins_traffic.kernels.trig import sincos
@@ -53,7 +52,7 @@ def test_all_that_trials_batches_games_and_environments_call_is_built() -> None:
         "envs.step_kernel.step_trials",
         "envs.step_kernel.observe_trials",
         "envs.about_ego.tell_cars",
-        "viewer.raster_kernel.paint",
+        "animation.raster_kernel.paint",
     } <= set(names)
 
 

@@ -12,8 +12,8 @@ from pathlib import Path
 import pytest
 from pyarrow import parquet
 
+from dubins_traffic.campaign import ray_crew, ray_driver
 from dubins_traffic.cli.main import main
-from dubins_traffic.runs import ray_crew, ray_driver
 from tests import ray_cluster
 from tests.campaigns import campaign, command, logged, run, succeed, written
 

@@ -6,7 +6,6 @@ from pathlib import Path
 import pytest
 from experiments.counter import CASES, Case, Drive, drive, instance
 
-from dubins_traffic.agents.counter import COUNTERSTRATEGY
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import EAgent
@@ -14,6 +13,7 @@ from dubins_traffic.problem.kinds import parameters_of
 from dubins_traffic.record.reader import from_bytes, read
 from dubins_traffic.record.schema import EVENTS
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.synthesis.counter_team import COUNTERSTRATEGY
 from dubins_traffic.verification.verify import verify
 from dubins_traffic.viewer.marks import event_marks
 from tests.tampering import Chunks, find, rebuilt

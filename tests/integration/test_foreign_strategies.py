@@ -15,13 +15,13 @@ import pytest
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.cli.main import main
 from dubins_traffic.controllers import registry
-from dubins_traffic.controllers.synthesized import STRATEGY_LEFT
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.record.reader import Record, read
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.synthesis.foreign.read import read_machine
 from dubins_traffic.synthesis.specification import specification, specification_text
+from dubins_traffic.synthesis.synthesized import STRATEGY_LEFT
 from tests import foreign
 from tests.games import ALL, board
 from tests.grammars import slugs_sections, tlsf_sections
@@ -310,7 +310,7 @@ def test_specifications_keep_to_their_grammars(some: Any, cells: list[int]) -> N
     spec = specification(some, cells)
     assert tlsf["inputs"] == slugs["INPUT"] == list(spec.inputs)
     assert tlsf["outputs"] == slugs["OUTPUT"] == list(spec.outputs)
-    assert len(slugs["SYS_LIVENESS"]) == len(some.arena.targets)
+    assert len(slugs["SYS_LIVENESS"]) == len(some.road_cells.targets)
 
 
 @pytest.mark.parametrize(

@@ -19,17 +19,17 @@ from dubins_traffic.cars.body import Car, Disc, DiscObstacle, PolygonObstacle, R
 from dubins_traffic.cars.sensing import Surroundings, rays_at, scan
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
+from dubins_traffic.gazebo import prefix
+from dubins_traffic.gazebo.link import Kind, LostError
+from dubins_traffic.gazebo.server import PREFIX, Folder
+from dubins_traffic.gazebo.simulator import Gazebo
+from dubins_traffic.gazebo.world import WHEEL_RADIUS
 from dubins_traffic.kernels.records import numbers
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.protocols import End
 from dubins_traffic.record.reader import replay
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Scorer
-from dubins_traffic.simulators.gazebo import prefix
-from dubins_traffic.simulators.gazebo.link import Kind, LostError
-from dubins_traffic.simulators.gazebo.server import PREFIX, Folder
-from dubins_traffic.simulators.gazebo.simulator import Gazebo
-from dubins_traffic.simulators.gazebo.world import WHEEL_RADIUS
 from dubins_traffic.verification.worlds import from_poses
 from tests.batches import pose, scene
 from tests.gazebo import installation

@@ -11,12 +11,12 @@ import pytest
 import dubins_traffic as dt
 from dubins_traffic.cars.body import Disc
 from dubins_traffic.errors import InputError
+from dubins_traffic.gazebo.link import Kind
+from dubins_traffic.gazebo.server import Server
+from dubins_traffic.gazebo.world import WHEEL_RADIUS, outlook, world
 from dubins_traffic.protocols import End
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.simulators.gazebo.link import Kind
-from dubins_traffic.simulators.gazebo.server import Server
-from dubins_traffic.simulators.gazebo.world import WHEEL_RADIUS, outlook, world
 from tests.batches import pose
 from tests.gazebo import installation
 

@@ -13,9 +13,9 @@ import pytest
 
 from dubins_traffic import load_config, run_batch
 from dubins_traffic.controllers import registry
-from dubins_traffic.controllers.learned import Learned, Policy, load
 from dubins_traffic.errors import InputError
-from dubins_traffic.observations.flat import Layout
+from dubins_traffic.learning.flat import Layout
+from dubins_traffic.learning.policy import Learned, Policy, load
 from dubins_traffic.scoring.score import Score
 
 pytestmark = pytest.mark.path

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from selenium.webdriver.support.wait import WebDriverWait
 
-from dubins_traffic.viewer.live import LiveView, png
+from dubins_traffic.animation.live import LiveView, png
 from tests.browser import browsing
 
 pytestmark = pytest.mark.tools("browser")

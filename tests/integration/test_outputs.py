@@ -15,15 +15,15 @@ import typer
 import dubins_traffic as dt
 from dubins_traffic.cli.commands import app
 from dubins_traffic.cli.main import main
-from dubins_traffic.controllers.learned import Policy
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import require_output
+from dubins_traffic.gazebo.world import write_sdf
 from dubins_traffic.interchange.bags import write_bag
+from dubins_traffic.learning.policy import Policy
 from dubins_traffic.problem.files import write_document
 from dubins_traffic.record.export import export
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.simulators.gazebo.world import write_sdf
 from tests.recordings import make_instance
 from tests.ros import need_ros
 

@@ -12,12 +12,11 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.browser import browsing
+from tests.browser import browsing, faults
 from tests.services import CRASHING, PASSWORD, STANDING, Service, competition_text, serving
 
 pytestmark = pytest.mark.tools("browser")
 
-AXE = Path(__file__).parents[1] / "vendor" / "axe.min.js"
 NASTY = "<img src=x onerror=window.broken=1>"
 WAIT_S = 600
 PHONE, DESKTOP = (390, 844), (1280, 900)
@@ -54,19 +53,6 @@ def login(browser: webdriver.Chrome, service: Service, name: str) -> None:
     browser.get(f"{service.url}/login")
     fill(browser, name=name, password=PASSWORD)
     WebDriverWait(browser, WAIT_S).until(lambda _: browser.current_url == f"{service.url}/")
-
-
-def faults(browser: webdriver.Chrome) -> list[str]:
-    """Return what axe finds of the page that is serious."""
-    browser.execute_script(AXE.read_text(encoding="utf-8"))
-    found = browser.execute_async_script(
-        "const done = arguments[arguments.length - 1]; axe.run({iframes: false}).then(r => done(r.violations))"
-    )
-    return [
-        f"{one['id']}: {one['nodes'][0]['html'][:200]}"
-        for one in found
-        if one["impact"] in ("serious", "critical")
-    ]
 
 
 def dark(browser: webdriver.Chrome, on: bool) -> None:

@@ -8,7 +8,6 @@ import pytest
 from experiments.synthesized import Drive, Events, drive, instance
 
 from dubins_traffic.controllers import registry
-from dubins_traffic.controllers.synthesized import STRATEGY_LEFT, Synthesized
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
@@ -19,6 +18,7 @@ from dubins_traffic.runs.single import run_trial
 from dubins_traffic.synthesis.answer import answer
 from dubins_traffic.synthesis.road_play import UNKNOWN_MOVE
 from dubins_traffic.synthesis.strategy import Strategy
+from dubins_traffic.synthesis.synthesized import STRATEGY_LEFT, Synthesized
 
 SAMPLE = (1, 3, 5, 7, 11, 13, 55)
 """On small networks, won."""

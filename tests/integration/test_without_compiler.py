@@ -13,7 +13,8 @@ EXAMPLES = Path(__file__).parents[2] / "examples" / "extending"
 TRIAL = """
 import json, sys
 if sys.argv[1] == "without":
-    from dubins_traffic.kernels import beside, library
+    from dubins_traffic.kernels import library
+    from dubins_traffic.compiling import beside
     beside.can_build = lambda: False
     library.libraries = tuple
 import dubins_traffic as dt

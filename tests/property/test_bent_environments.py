@@ -13,7 +13,7 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from dubins_traffic.controllers.scripted import Scripted
-from dubins_traffic.observations.flat import FlatObserver
+from dubins_traffic.learning.flat import FlatObserver
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.record.reader import read
 from dubins_traffic.runs.single import run_trial

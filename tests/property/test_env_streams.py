@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode
 from dubins_traffic import load_config
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.controllers.scripted import Scripted
-from dubins_traffic.observations.flat import FlatObserver
+from dubins_traffic.learning.flat import FlatObserver
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.record.reader import read
 from dubins_traffic.runs.single import run_trial

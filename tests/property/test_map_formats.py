@@ -14,12 +14,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dubins_traffic.maps.losses import Losses
+from dubins_traffic.maps.polylines import to_segments
+from dubins_traffic.maps.settings import ImportSettings
 from dubins_traffic.roads.formats import registry
 from dubins_traffic.roads.formats.registry import WritesMaps
 from dubins_traffic.roads.generate import generate, most_segments
-from dubins_traffic.roads.maps.losses import Losses
-from dubins_traffic.roads.maps.polylines import to_segments
-from dubins_traffic.roads.maps.settings import ImportSettings
 from dubins_traffic.roads.network import RoadNetwork
 from tests.foreign_maps import FOREIGN
 from tests.roadnets import winding

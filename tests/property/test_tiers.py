@@ -5,9 +5,10 @@ from pathlib import Path
 
 import pytest
 
+from dubins_traffic.compiling import beside, store
 from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.engine.batch_kernel import run_trials
-from dubins_traffic.kernels import beside, compile, library, store
+from dubins_traffic.kernels import compile, library
 from dubins_traffic.kernels.compile import Kernel
 from dubins_traffic.kernels.machine import Code
 from dubins_traffic.problem.draw import draw
@@ -45,7 +46,9 @@ class Switches:
             monkeypatch.setattr(kernel, "_known", {})
             monkeypatch.setattr(kernel, "is_quick", False)
         monkeypatch.setattr(beside, "PAUSE", 0.0)
+        monkeypatch.setattr(compile, "PAUSE", 0.0)
         monkeypatch.setattr(compile, "waits", lambda: False)
+        monkeypatch.setattr(beside, "waits", lambda: False)
         monkeypatch.setattr(Kernel, "_sought", seek)
         monkeypatch.setattr(beside.Waiting, "is_there", look)
 

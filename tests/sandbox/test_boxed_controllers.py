@@ -226,7 +226,7 @@ def test_a_folder_with_a_manifest_may_import_its_neighbours(tmp_path: Path) -> N
     assert result.ending.end is End.DURATION
 
 
-@pytest.mark.parametrize("spec", ["keyboard", "nobody", "program:/no/such", "no.py:Mine", "nowhere:Mine"])
+@pytest.mark.parametrize("spec", ["nobody", "program:/no/such", "no.py:Mine", "nowhere:Mine"])
 def test_what_can_not_drive_in_a_box_is_refused(spec: str) -> None:
     with pytest.raises(InputError):
         boxed_controller(spec)

@@ -55,7 +55,7 @@ def test_a_fault_in_a_box_is_told_by_its_name(tmp_path: Path, capsys: pytest.Cap
         ["--limits", "speed=1"],
         ["--limits", "memory=much"],
         ["--trust-submissions"],
-        ["--sandbox", "--controller", "keyboard"],
+        ["--sandbox", "--controller", "nobody"],
         ["--sandbox", "--controller", "program:/no/such/file"],
     ],
 )

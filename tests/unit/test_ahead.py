@@ -49,7 +49,7 @@ def test_what_is_fetched_ahead_changes_nothing_and_may_be_anywhere() -> None:
 COMPILE = """
 import sys
 from dubins_traffic.kernels import compile as making
-from dubins_traffic.kernels.compiler import Compiler
+from dubins_traffic.compiling.compiler import Compiler
 from dubins_traffic.kernels.kinds import kind_of
 compiler = Compiler()
 making.builder = compiler.jit

@@ -18,13 +18,13 @@ import pytest
 from PIL import Image as Pictures
 
 import dubins_traffic as dt
+from dubins_traffic.animation import animate as moving
+from dubins_traffic.animation.indexed import Colours, changes
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError, MissingExtraError
 from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.viewer import animate as moving
-from dubins_traffic.viewer.indexed import Colours, changes
 from tests.recordings import make_instance
 from tests.synthetic import driven, instance, verdict
 from tests.tools import need

@@ -101,7 +101,7 @@ def test_simple_costs_microseconds() -> None:
 
 def test_built_in_controllers_are_listed() -> None:
     listed = registry.names()
-    assert set(listed) == {"keyboard", "simple", "lanes", "rules", "synthesized"}
+    assert set(listed) == {"simple", "lanes", "rules", "synthesized"}
     assert all(line and "\n" not in line for line in listed.values())
     assert isinstance(registry.load("simple"), Simple)
 

@@ -24,7 +24,7 @@ from dubins_traffic.envs.episodes import Episodes, Levels
 from dubins_traffic.envs.parallel import TrafficParallelEnv
 from dubins_traffic.envs.terms import COSTS, TERMS
 from dubins_traffic.errors import DubinsTrafficError, InputError
-from dubins_traffic.observations.flat import FlatObserver
+from dubins_traffic.learning.flat import FlatObserver
 from dubins_traffic.runs.single import run_trial
 from tests.environments import SHORT, single, vector, weaving
 

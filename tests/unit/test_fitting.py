@@ -9,12 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from dubins_traffic.maps.drafting import on_itself, spread
+from dubins_traffic.maps.fitting import Fit, Limits, fit
+from dubins_traffic.maps.opendrive import Placed, clothoid, cubic, cubic_over
+from dubins_traffic.maps.polylines import rounded, to_segments, true_length
+from dubins_traffic.maps.settings import ImportSettings
 from dubins_traffic.roads.chains import chain
-from dubins_traffic.roads.formats.opendrive import Placed, clothoid, cubic, cubic_over
-from dubins_traffic.roads.maps.drafting import on_itself, spread
-from dubins_traffic.roads.maps.fitting import Fit, Limits, fit
-from dubins_traffic.roads.maps.polylines import rounded, to_segments, true_length
-from dubins_traffic.roads.maps.settings import ImportSettings
 
 LIMITS = Limits(0.1, 4.8, 9.0)
 

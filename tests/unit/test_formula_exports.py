@@ -6,17 +6,6 @@ from random import Random
 
 import pytest
 
-from dubins_traffic.logic.exports import (
-    FORMATS,
-    Specification,
-    latex,
-    slugs,
-    spin,
-    spot,
-    stl,
-    tlsf,
-    tulip,
-)
 from dubins_traffic.logic.formula import (
     ASCII,
     SPIN,
@@ -31,6 +20,17 @@ from dubins_traffic.logic.formula import (
     written_together,
 )
 from dubins_traffic.logic.parse import parse
+from dubins_traffic.specifications.exports import (
+    FORMATS,
+    Specification,
+    latex,
+    slugs,
+    spin,
+    spot,
+    stl,
+    tlsf,
+    tulip,
+)
 from tests.formulas import drawn
 from tests.grammars import TLSF, slugs_sections, tlsf_sections
 

@@ -11,11 +11,8 @@ from shapely.ops import unary_union
 
 from dubins_traffic.cars.body import Disc, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.errors import InputError
-from dubins_traffic.roads.generate import generate
-from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.simulators import registry
-from dubins_traffic.simulators.gazebo import install, prefix
-from dubins_traffic.simulators.gazebo.world import (
+from dubins_traffic.gazebo import install, prefix
+from dubins_traffic.gazebo.world import (
     MARKER,
     TRACK,
     WALL,
@@ -26,6 +23,9 @@ from dubins_traffic.simulators.gazebo.world import (
     walls,
     world,
 )
+from dubins_traffic.roads.generate import generate
+from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.simulators import registry
 from tests.batches import pose
 from tests.recordings import make_instance
 

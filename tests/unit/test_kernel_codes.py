@@ -35,7 +35,7 @@ def judge(bits, kept):
 COMPILE = """
 import sys
 from dubins_traffic.kernels import compile as making
-from dubins_traffic.kernels.compiler import Compiler
+from dubins_traffic.compiling.compiler import Compiler
 compiler = Compiler()
 making.builder = compiler.jit
 import judging

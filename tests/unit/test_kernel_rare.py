@@ -22,7 +22,7 @@ def drive(way):
 """
 COMPILE = """
 from dubins_traffic.kernels import compile as making
-from dubins_traffic.kernels.compiler import Compiler
+from dubins_traffic.compiling.compiler import Compiler
 
 class Watched(Compiler):
     def _set_apart(self, program):

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.kernels.sources import KEEPERS, MAKERS, PACKAGE, imported
-from dubins_traffic.kernels.store import SUFFIX, kernel_file, key_of, load, save
+from dubins_traffic.compiling.store import SUFFIX, kernel_file, load, save
+from dubins_traffic.kernels.sources import KEEPERS, MAKERS, PACKAGE, imported, key_of
 
 CALL = "from dubins_traffic.kernels.trig import sincos; print(sincos(0.5))"
 

@@ -10,8 +10,9 @@ from pathlib import Path
 import pytest
 
 import dubins_traffic
+from dubins_traffic.compiling import linking
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels import levels, linking
+from dubins_traffic.kernels import levels
 from dubins_traffic.kernels.folders import is_private
 from dubins_traffic.kernels.levels import LEVELS
 from dubins_traffic.kernels.trig import sincos
@@ -22,7 +23,7 @@ LINKED = pytest.mark.tools("linkers")
 """The mark of tests that link a library."""
 ASKED = """
 import sys
-from dubins_traffic.kernels import beside
+from dubins_traffic.compiling import beside
 from dubins_traffic.kernels.trig import sincos
 beside.can_build = lambda: False
 print(sincos(0.5), sincos.is_quick, "llvmlite" in sys.modules)
@@ -33,13 +34,13 @@ SLOW = f"{sincos.interpreted(0.5)} False False\n"
 LINK = """
 import sys
 from pathlib import Path
-from dubins_traffic.kernels import linking, machine, store
+from dubins_traffic.compiling import linking, loading, store
 from dubins_traffic.kernels.kinds import kind_of
 from dubins_traffic.kernels.levels import level
 from dubins_traffic.kernels.trig import sincos
 sincos(0.5)
 key = sincos.key((kind_of(0.5),))
-print(linking.link({key: store.kernel_file(key, machine.target())}, level(), Path(sys.argv[1])))
+print(linking.link({key: store.kernel_file(key, loading.target())}, level(), Path(sys.argv[1])))
 """
 
 

@@ -10,7 +10,8 @@ import pytest
 
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
-from dubins_traffic.roads.formats import registry, xml_text
+from dubins_traffic.maps import xml_text
+from dubins_traffic.roads.formats import registry
 from dubins_traffic.roads.network import RoadNetwork
 from tests.foreign_maps import FOREIGN, both, changed, opendrive, sumo, written
 

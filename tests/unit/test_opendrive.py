@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from dubins_traffic.roads.formats.opendrive import OpenDrive
-from dubins_traffic.roads.maps.polylines import to_segments
-from dubins_traffic.roads.maps.settings import ImportSettings
+from dubins_traffic.maps.opendrive import OpenDrive
+from dubins_traffic.maps.polylines import to_segments
+from dubins_traffic.maps.settings import ImportSettings
 from dubins_traffic.roads.network import RoadNetwork
 from tests.room import lacking
 

@@ -11,10 +11,10 @@ import pytest
 from dubins_traffic import files
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
+from dubins_traffic.maps.losses import Losses
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.record import reader
 from dubins_traffic.roads.formats import registry
-from dubins_traffic.roads.maps.losses import Losses
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.sources import load
 from tests.foreign_maps import FOREIGN, written

@@ -12,6 +12,10 @@ import numpy as np
 import pytest
 from PIL import Image as Pictures
 
+from dubins_traffic.animation.live import png
+from dubins_traffic.animation.raster import Raster
+from dubins_traffic.animation.raster_ground import rgb
+from dubins_traffic.animation.raster_kernel import MARKS, Image
 from dubins_traffic.cars.body import PolygonObstacle
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
@@ -20,10 +24,6 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.live import png
-from dubins_traffic.viewer.raster import Raster
-from dubins_traffic.viewer.raster_ground import rgb
-from dubins_traffic.viewer.raster_kernel import MARKS, Image
 from dubins_traffic.viewer.shapes import stop_lines
 from tests.synthetic import instance, obstacles_beside
 
@@ -145,7 +145,7 @@ def test_marks_have_their_colours_and_rings_fade(trial: Instance) -> None:
 
 def test_equal_frames_give_equal_bytes_interpreted_too(trial: Instance) -> None:
     script = (
-        "import sys, numpy as np, hashlib; from dubins_traffic.viewer.raster import Raster\n"
+        "import sys, numpy as np, hashlib; from dubins_traffic.animation.raster import Raster\n"
         "from dubins_traffic.problem.configuration import load_config\n"
         "from dubins_traffic.problem.draw import draw\n"
         "one = draw(load_config('town'), seed=3, trial=1)\n"

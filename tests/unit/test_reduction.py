@@ -11,15 +11,15 @@ import pytest
 
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
+from dubins_traffic.maps import reduction
+from dubins_traffic.maps.losses import Losses, Reason
+from dubins_traffic.maps.opendrive import OpenDrive, Placed, clothoid
+from dubins_traffic.maps.osm import OpenStreetMap
+from dubins_traffic.maps.settings import ImportSettings
+from dubins_traffic.maps.sumo import SumoNet
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.roads.formats import registry
-from dubins_traffic.roads.formats.opendrive import OpenDrive, Placed, clothoid
-from dubins_traffic.roads.formats.osm import OpenStreetMap
-from dubins_traffic.roads.formats.sumo import SumoNet
-from dubins_traffic.roads.maps import reduction
-from dubins_traffic.roads.maps.losses import Losses, Reason
-from dubins_traffic.roads.maps.settings import ImportSettings
 from dubins_traffic.roads.network import RoadNetwork
 from tests.foreign_maps import BENT, both, opendrive, sumo, written
 from tests.room import lacking

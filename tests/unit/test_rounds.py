@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from dubins_traffic import draw, load_config
-from dubins_traffic.observations.outlook import metres_to_vertices
+from dubins_traffic.learning.outlook import metres_to_vertices
 from dubins_traffic.routing.rounds import find_all, round_time
 from dubins_traffic.routing.tours import EXACT, LaneGraph, find_round, find_rounds, lane_graph
 

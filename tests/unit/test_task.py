@@ -14,7 +14,6 @@ import pytest
 from dubins_traffic.cli.main import main
 from dubins_traffic.cli.spec import PLAIN, SUFFIXES, Format
 from dubins_traffic.errors import InputError
-from dubins_traffic.logic.exports import FORMATS, Specification
 from dubins_traffic.logic.formula import Op, conj, propositions, subformulas
 from dubins_traffic.logic.parse import parse
 from dubins_traffic.problem.configuration import load_config
@@ -22,8 +21,9 @@ from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.rules.task import task
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.specifications.exports import FORMATS, Specification
+from dubins_traffic.specifications.task import task
 from tests.judging import GRID, case
 
 Command = Callable[..., str]

@@ -15,8 +15,9 @@ import numpy as np
 import pytest
 
 import dubins_traffic
+from dubins_traffic.compiling import beside, builder
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels import beside, builder, compile
+from dubins_traffic.kernels import compile
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import Kernel, jit
@@ -145,7 +146,7 @@ def test_a_builder_for_which_nobody_waits_leaves_processors_to_all_others(cache)
 HEARD_LATER = """
 import ctypes, os
 from contextlib import suppress
-from dubins_traffic.kernels import builder
+from dubins_traffic.compiling import builder
 os.setsid()
 if os.getuid() == 0:
     os.setgid(65534)
@@ -215,7 +216,7 @@ def test_a_builder_takes_no_notice_of_lines_it_cannot_use(cache) -> None:
         "dubins_traffic.kernels.trig", "sincos", "/gone", "()", str(kernel.with_name("x.kernel"))
     )
     lines = wish.line()[:-9] + b"\n" + b"[]\n" + wish.line()
-    command = [sys.executable, "-m", "dubins_traffic.kernels.builder"]
+    command = [sys.executable, "-m", "dubins_traffic.compiling.builder"]
     around = environment(cache, "auto")
     assert subprocess.run(command, input=lines, env=around, check=False, timeout=PATIENCE).returncode == 0
     assert "is another" in wish.failure.read_text() or "/gone" in wish.failure.read_text()
@@ -245,7 +246,7 @@ def test_waiting_can_be_interrupted_and_what_is_compiled_is_kept(cache) -> None:
 @pytest.mark.parametrize("tier", ["auto", "compiled"])
 def test_where_nothing_can_be_kept_kernels_run_interpreted(tmp_path, tier) -> None:
     code = (
-        "import dubins_traffic.kernels.store as store, pathlib\n"
+        "import dubins_traffic.compiling.store as store, pathlib\n"
         "store.cache_folder = lambda: pathlib.Path('/proc/nowhere')\n" + CALL
     )
     assert python(tmp_path, code, tier)[0] == f"{sincos(0.5)}\n"

@@ -7,8 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.roads.maps.fitting import traced
-from dubins_traffic.roads.maps.polylines import dense, nearest
+from dubins_traffic.maps.fitting import traced
+from dubins_traffic.maps.polylines import dense, nearest
 
 
 @given(st.integers(0, 1000), st.integers(1, 300), st.integers(2, 300))

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
+from dubins_traffic.above import ABOVE
 from dubins_traffic.agents.kernel import decide
 from dubins_traffic.agents.kinds import Lists, fill
 from dubins_traffic.agents.nudge import nudge
@@ -30,10 +31,10 @@ from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.problem.kinds import ALONE, COUNTER, FREE, KEEP_RULES, NUDGED, OWN
+from dubins_traffic.protocols import Draws, Driver, Reports
 from dubins_traffic.roads.table import RoadTable, pack_distinct
 
 if TYPE_CHECKING:
-    from dubins_traffic.agents.counter import CounterTeam
     from dubins_traffic.agents.free import FreeCars
     from dubins_traffic.agents.lawful import Lawful
     from dubins_traffic.problem.instance import Instance
@@ -41,6 +42,10 @@ if TYPE_CHECKING:
 REMEMBERED = 12.0
 """Length of the ego's path that is remembered in addition to the gap, metres (for w = 0.3 m)."""
 PAIRS = 64
+
+
+class Playing(Driver, Draws, Reports, Protocol):
+    """Drives the e-agents of kind `counter`, all of a trial as one team."""
 
 
 class Fleet:
@@ -165,11 +170,9 @@ def _lawful() -> Lawful:
     return Lawful()
 
 
-def _counter() -> CounterTeam:
-    """Return the driver of the cars that play a counterstrategy."""
-    from dubins_traffic.agents.counter import CounterTeam
-
-    return CounterTeam()
+def _counter() -> Playing:
+    """Return the driver of the cars that play a counterstrategy, which a room above has."""
+    return ABOVE.parts("e-agents")[COUNTER]()()
 
 
 def _free(instances: Sequence[Instance], cars: int, roads: RoadTable, net: Ints) -> FreeCars:

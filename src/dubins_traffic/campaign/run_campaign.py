@@ -14,6 +14,7 @@ from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign, load_campaign
 from dubins_traffic.campaign.chunks import Chunk, Pace
 from dubins_traffic.campaign.folder import Folder, Keep, Records
+from dubins_traffic.campaign.ray_crew import check_address, crew_at
 from dubins_traffic.engine.batch import run_together
 from dubins_traffic.engine.egos import Egos
 from dubins_traffic.errors import DubinsTrafficError, InputError
@@ -21,7 +22,6 @@ from dubins_traffic.outside import put_back
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.record.wall import remove_record
 from dubins_traffic.runs.crew import Cancelled, Crew, carry_out, never
-from dubins_traffic.runs.ray_crew import check_address, crew_at
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import Maker
 

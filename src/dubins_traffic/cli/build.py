@@ -49,7 +49,7 @@ def warm(
 
 
 def _build(folder: Path | None) -> None:
-    from dubins_traffic.checkup.building import build
+    from dubins_traffic.compiling.building import build
 
     with progress(what="kernels") as tell:
         built = build(folder, tell)

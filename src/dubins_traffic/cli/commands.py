@@ -16,6 +16,7 @@ from dubins_traffic.cli import (
     convert,
     estimate,
     evaluate,
+    explain,
     falsify,
     faults,
     gazebo,
@@ -23,6 +24,7 @@ from dubins_traffic.cli import (
     listing,
     messages,
     network,
+    play,
     plot,
     replay,
     run,
@@ -36,6 +38,7 @@ from dubins_traffic.cli import (
     synth,
     template,
     verify,
+    watch,
     worker,
 )
 from dubins_traffic.sessions.registry import TRANSPORTS
@@ -79,9 +82,12 @@ def _options(  # pyright: ignore[reportUnusedFunction]
 app.command("network", epilog=network.EXAMPLES)(network.network)
 app.command("instance", epilog=instance.EXAMPLES)(instance.instance)
 app.command("run", epilog=run.EXAMPLES)(run.run)
+app.command("watch", epilog=watch.EXAMPLES)(watch.watch)
+app.command("play", epilog=play.EXAMPLES)(play.play)
 app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
 app.command("score", epilog=score.EXAMPLES)(score.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)
+app.command("explain", epilog=explain.EXAMPLES)(explain.explain)
 app.command("verify", epilog=verify.EXAMPLES)(verify.verify)
 app.command("check-controller", epilog=check_controller.EXAMPLES)(check_controller.check_controller)
 app.command("spec", epilog=spec.EXAMPLES)(spec.spec)

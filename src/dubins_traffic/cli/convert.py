@@ -62,13 +62,14 @@ def convert(
 ) -> None:
     """Convert a road network (its suffix says to which map format) or a record (to `.csv`, `.parquet` or `.bag`).
 
-    Of the map of another program only what a network can hold is converted, and what was lost is told (docs/maps.md).
+    Of the map of another program only what a network can hold is converted, and what was lost is told.
 
     A road network also becomes a world for Gazebo (`.sdf`); an instance or a record one with its obstacles and cars.
     A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`), each further trial of it another one (`-1.mcap`,
     ...); beside a bag stands the trial data of 2016, `.trial.json`.
     """
     from dubins_traffic.files import is_stream
+    from dubins_traffic.gazebo.world import Version, write_sdf
     from dubins_traffic.interchange.bags import is_bag, write_bag
     from dubins_traffic.interchange.lcm_log import is_log
     from dubins_traffic.problem.instance import Instance
@@ -77,7 +78,6 @@ def convert(
     from dubins_traffic.roads.formats import registry as formats
     from dubins_traffic.roads.network import RoadNetwork
     from dubins_traffic.runs.sources import load
-    from dubins_traffic.simulators.gazebo.world import Version, write_sdf
 
     if not is_stream(file) and (is_bag(file) or is_log(file)):
         _to_records(file, output, overwrite=overwrite)

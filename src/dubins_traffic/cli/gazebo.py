@@ -11,7 +11,7 @@ import typer
 from dubins_traffic.cli import faults, options
 
 if TYPE_CHECKING:
-    from dubins_traffic.simulators.gazebo.install import Progress
+    from dubins_traffic.gazebo.install import Progress
 
 INSTALL_EXAMPLES = options.examples("gazebo install", "gazebo install --prefix ~/gazebo")
 DOCTOR_EXAMPLES = options.examples("gazebo doctor")
@@ -35,8 +35,8 @@ Prefix = Annotated[
 @app.command("install", epilog=INSTALL_EXAMPLES)
 def install(prefix: Prefix = None) -> None:
     """Install Gazebo 11 into a folder of yours, without root, and check it. Interrupted, it goes on next time."""
-    from dubins_traffic.simulators.gazebo import install as installer
-    from dubins_traffic.simulators.gazebo.prefix import place
+    from dubins_traffic.gazebo import install as installer
+    from dubins_traffic.gazebo.prefix import place
 
     folder = place(prefix)
     print(installer.announcement(folder), flush=True)
@@ -52,8 +52,8 @@ def install(prefix: Prefix = None) -> None:
 @app.command("doctor", epilog=DOCTOR_EXAMPLES)
 def doctor(prefix: Prefix = None) -> None:
     """Look whether Gazebo can be used, and say what is missing."""
-    from dubins_traffic.simulators.gazebo.install import examine
-    from dubins_traffic.simulators.gazebo.prefix import place
+    from dubins_traffic.gazebo.install import examine
+    from dubins_traffic.gazebo.prefix import place
 
     well = True
     for finding in examine(place(prefix)):

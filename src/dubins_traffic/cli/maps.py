@@ -15,7 +15,7 @@ from dubins_traffic.cli import options
 from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
-    from dubins_traffic.roads.maps.losses import Losses
+    from dubins_traffic.maps.losses import Losses
     from dubins_traffic.roads.network import RoadNetwork
 
 LossesOption = Annotated[
@@ -34,9 +34,9 @@ def imported(file: str, scale: float | None, w: float | None, tolerance: float) 
     Where a scale is given and `w` is not, that is half a lane of the map at the scale.
     """
     from dubins_traffic.files import read_text
+    from dubins_traffic.maps.foreign import ForeignFormat
+    from dubins_traffic.maps.settings import ImportSettings, W
     from dubins_traffic.roads.formats import registry as formats
-    from dubins_traffic.roads.formats.foreign import ForeignFormat
-    from dubins_traffic.roads.maps.settings import ImportSettings, W
     from dubins_traffic.roads.network import RoadNetwork
 
     text = read_text(file)
@@ -67,7 +67,7 @@ def telling(outputs: list[str] | None, *others: str | None, overwrite: bool) -> 
 
     `others` are what is read, and what else is written.
     """
-    from dubins_traffic.roads.maps.losses import NothingHeldError
+    from dubins_traffic.maps.losses import NothingHeldError
 
     try:
         yield
@@ -125,7 +125,7 @@ def _tell(losses: Losses, outputs: list[str], *, overwrite: bool) -> None:
         if _is_json(output):
             write_text(output, json.dumps(losses.document(), indent=1) + "\n")
         else:
-            from dubins_traffic.viewer.losses import write_losses
+            from dubins_traffic.maps.loss_picture import write_losses
 
             write_losses(output, losses, overwrite=overwrite)
         options.tell(output)
@@ -133,8 +133,8 @@ def _tell(losses: Losses, outputs: list[str], *, overwrite: bool) -> None:
 
 def _losses(network: RoadNetwork | None) -> Losses | None:
     """Return what was lost of the map from which a network comes, None where it comes from none."""
+    from dubins_traffic.maps.losses import Losses
     from dubins_traffic.roads.formats import registry as formats
-    from dubins_traffic.roads.maps.losses import Losses
 
     found = None if network is None else network.known.get(formats.LOSSES)
     return found if isinstance(found, Losses) else None

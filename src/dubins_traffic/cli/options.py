@@ -86,7 +86,7 @@ Sandbox = Annotated[
     bool,
     typer.Option(
         "--sandbox",
-        help="Run the controller in a box (docs/sandbox.md); none of its code is loaded here.",
+        help="Run the controller in a box; none of its code is loaded here.",
     ),
 ]
 Limits = Annotated[
@@ -162,6 +162,23 @@ Source = Annotated[
         show_default=False,
         autocompletion=shipped,
     ),
+]
+Pace = Annotated[
+    float, typer.Option("--pace", metavar="X", help="Seconds of the trial in a second, in the page.")
+]
+Port = Annotated[
+    int,
+    typer.Option(
+        "--port",
+        metavar="P",
+        min=0,
+        max=65535,
+        help="Port of the page, on this machine only.",
+        show_default="one that is free",
+    ),
+]
+NoBrowser = Annotated[
+    bool, typer.Option("--no-browser", help="Print the address of the page, and open no browser.")
 ]
 Record = Annotated[str, typer.Argument(metavar="RECORD", help="A record, `*.mcap`.", show_default=False)]
 

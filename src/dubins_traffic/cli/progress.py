@@ -7,13 +7,10 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def progress(
-    trials: int | None = None, *, hidden: bool = False, what: str = "trials"
-) -> Generator[Callable[[int, int], object]]:
+def progress(trials: int | None = None, *, what: str = "trials") -> Generator[Callable[[int, int], object]]:
     """Show how many of the trials, or of `what` else, are done, on standard error and only to people.
 
     Yields what is to be told (trials done, trials in all); `trials` is how many there are, if that is known before.
-    `hidden`: nothing is shown, since someone else draws there.
     """
     from rich.console import Console
     from rich.progress import (
@@ -34,8 +31,6 @@ def progress(
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(
-        *columns, console=console, transient=True, disable=hidden or not console.is_terminal
-    ) as shown:
+    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as shown:
         task = shown.add_task(what, total=trials)
         yield lambda done, total: shown.update(task, completed=done, total=total)

@@ -79,11 +79,11 @@ def replay(
     overwrite: options.Replace = False,
 ) -> None:
     """Make a self-contained page that replays a trial in a browser, or a moving picture of it."""
+    from dubins_traffic.animation.animate import CODECS, SUFFIXES, VIDEO_FPS, animate, require_moving
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.cli.tables import summary
     from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.score import score
-    from dubins_traffic.viewer.animate import CODECS, SUFFIXES, VIDEO_FPS, animate, require_moving
     from dubins_traffic.viewer.marks import formula_marks
     from dubins_traffic.viewer.pages import PAGES
     from dubins_traffic.viewer.replay import write_replay

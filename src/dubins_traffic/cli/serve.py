@@ -62,6 +62,7 @@ def serve(
     What it needs to know stands in DIR/service.toml; without one it works on this machine alone. Ctrl-C ends it.
     """
     from dubins_traffic.cli.extras import needs
+    from dubins_traffic.live import listening
 
     with needs("serving competitions", "service"):
         from dubins_traffic.service import logs, serving
@@ -72,8 +73,8 @@ def serve(
         check_boxes(trust=trust)
     place = Path(folder)
     service = Service(place, default_key(place) if key_file is None else Path(key_file))
-    opened = serving.listen(serving.Place(host, port))
-    url = serving.address_of(opened)
+    opened = listening.listen(host, port)
+    url = listening.address_of(opened)
     joining = serving.prepare(service, [Path(path) for path in competition or ()], url)
     print(f"Serving {folder} at {service.settings.url or url}", flush=True)
     if service.settings.url:

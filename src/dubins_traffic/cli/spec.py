@@ -15,9 +15,9 @@ from dubins_traffic.cli.faults import tell
 from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
-    from dubins_traffic.logic.exports import Specification
     from dubins_traffic.logic.formula import Formula, FormulaError
     from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.specifications.exports import Specification
 
 EXAMPLES = options.examples(
     "spec first.json",
@@ -79,7 +79,7 @@ def spec(
     overwrite: options.Replace = False,
 ) -> None:
     """Print the task of a problem as temporal logic: what is assumed of the others, and what the ego guarantees."""
-    from dubins_traffic.rules.task import task
+    from dubins_traffic.specifications.task import task
 
     if period is not None and not 0.0 < period < math.inf:
         raise InputError("not a period", field="--period", value=period, expected="seconds > 0")
@@ -147,8 +147,8 @@ def _in_language(spec: Specification, format: Format, period: float, source: str
     InputError
         If it can't say it; names the formula.
     """
-    from dubins_traffic.logic.exports import FORMATS
     from dubins_traffic.logic.formula import FormulaError
+    from dubins_traffic.specifications.exports import FORMATS
 
     if format in ONE_FORMULA and not spec.guarantees:
         spec = replace(spec, assumptions=(), guarantees=spec.assumptions)

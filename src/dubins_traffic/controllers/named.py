@@ -14,7 +14,6 @@ from dubins_traffic.outside import Seam
 from dubins_traffic.protocols import Controller
 
 BUILT_IN: Final = {
-    "keyboard": ("Keyboard", "you, with the arrow keys, in real time; the map is drawn in the terminal"),
     "lanes": (
         "Lanes",
         "shortest route through the goals in the right lane; follows cars, waits at occupied intersections",
@@ -81,4 +80,5 @@ def foreign(spec: str) -> str | None:
 
 
 def _module(name: str) -> Any:
-    return importlib.import_module(f"dubins_traffic.controllers.{name}")
+    above = ABOVE.parts("controllers")
+    return above[name]() if name in above else importlib.import_module(f"dubins_traffic.controllers.{name}")

@@ -28,7 +28,7 @@ from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
-from dubins_traffic.observations.outlook import new_outlook
+from dubins_traffic.learning.outlook import new_outlook
 from dubins_traffic.problem.draw import check_numbers
 from dubins_traffic.protocols import End, Ending
 

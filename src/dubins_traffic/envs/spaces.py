@@ -14,7 +14,7 @@ from dubins_traffic.kernels.arrays import Floats
 if TYPE_CHECKING:
     import numpy.typing as npt
 
-    from dubins_traffic.observations.flat import Layout
+    from dubins_traffic.learning.flat import Layout
 
 
 class ObservationSpace(spaces.Space[Observation]):
@@ -70,13 +70,7 @@ def info_of_one(terms: Floats, weighted: Floats) -> dict[str, Any]:
 
 
 class StepInfo:
-    """Makes the info of steps of all environments.
-
-    Parameters
-    ----------
-    envs : int
-        How many there are.
-    """
+    """Makes the info of steps of all environments."""
 
     def __init__(self, envs: int) -> None:
         everyone = np.ones(envs, dtype=np.bool_)

@@ -10,10 +10,12 @@ for never compiling, as ``NUMBA_DISABLE_JIT=1`` does. A kernel looks into what i
 from __future__ import annotations
 
 import inspect
+import multiprocessing
 import os
+import sys
 from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
-from functools import cached_property, update_wrapper
+from functools import cache, cached_property, update_wrapper
 from pathlib import Path
 from time import monotonic
 from types import FunctionType
@@ -21,8 +23,9 @@ from typing import Any, Generic, NamedTuple, ParamSpec, Protocol, TypeVar, cast
 
 import numpy as np
 
+from dubins_traffic.above import ABOVE
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels import beside, library, machine, store
+from dubins_traffic.kernels import library, sources
 from dubins_traffic.kernels.folders import KEPT, TIER
 from dubins_traffic.kernels.kinds import Kind, UnfitError, kind_of
 from dubins_traffic.kernels.machine import Code
@@ -34,14 +37,25 @@ CACHES = "DUBINS_TRAFFIC_CACHES"
 """The environment variable that turns off all that kernels keep from tick to tick: for tests, and to find mistakes."""
 TIERS = ("auto", "compiled", "interpreted", KEPT)
 """`kept`: what has been compiled is used, of a folder that need not be one's own, and nothing else is compiled."""
-BESIDE = (
-    "kernels are being compiled in the background; until they are there, trials run interpreted, slower and with "
-    "the same results"
-)
-NO_COMPILER = (
-    "there is no machine code for some kernels, which run interpreted, slower and with the same results; "
-    "pip install 'dubins-traffic[compile]' compiles them"
-)
+PAUSE = 0.25
+"""Seconds between two looks for a kernel that is wanted."""
+
+
+class Waiting(Protocol):
+    """A kernel that is wanted, while a room above compiles it."""
+
+    @property
+    def failure(self) -> str:
+        """Why it could not be compiled; empty otherwise."""
+        ...
+
+    def is_there(self) -> bool:
+        """Tell whether the kernel has been compiled, looking no more often than every `PAUSE` seconds."""
+        ...
+
+    def wait(self) -> bool:
+        """Wait for the kernel; return whether it has been compiled."""
+        ...
 
 
 class Maker(Protocol):
@@ -192,15 +206,17 @@ class Kernel(Generic[P, R]):
     ----------
     is_quick : bool
         Whether calls have gone over to machine code.
+    patient
+        The same.
     """
 
     def __init__(self, function: Callable[P, R], *, patient: bool = False) -> None:
         update_wrapper(self, function)
         self.is_quick = False
-        self._patient = patient
+        self.patient = patient
         self._pause = 0.0
         self._function = cast(FunctionType, function)
-        self._known: dict[tuple[Kind, ...], Code | beside.Waiting | None] = {}
+        self._known: dict[tuple[Kind, ...], Code | Waiting | None] = {}
 
     def __call__(self, *args: P.args, **named: P.kwargs) -> R:
         """Run the kernel."""
@@ -246,39 +262,24 @@ class Kernel(Generic[P, R]):
             found = self._known[kinds]
         except KeyError:
             found = self._known[kinds] = self._sought(kinds)
-        if isinstance(found, beside.Waiting):
-            if found.wait() if self._patient or waits() else found.is_there():
+        if found is not None and not isinstance(found, Code):
+            if found.wait() if self.patient or waits() else found.is_there():
                 found = self._known[kinds] = self._sought(kinds)
             elif found.failure:
-                beside.say(f"{self._function.__name__} stays interpreted: {found.failure.splitlines()[-1]}")
+                say(f"{self._function.__name__} stays interpreted: {found.failure.splitlines()[-1]}")
                 found = self._known[kinds] = None
             else:
-                self._pause = monotonic() + beside.PAUSE
+                self._pause = monotonic() + PAUSE
         return found if isinstance(found, Code) else None
 
-    def _sought(self, kinds: tuple[Kind, ...]) -> Code | beside.Waiting | None:
+    def _sought(self, kinds: tuple[Kind, ...]) -> Code | Waiting | None:
         if not self.has_source:
             return None
-        symbol = store.symbol(self.key(kinds))
-        held = library.find(symbol)
-        if held is not None:
+        held = library.find(sources.symbol(self.key(kinds)))
+        found = ABOVE.compiled(self, kinds) if held is None else Code(kinds, *held)
+        if isinstance(found, Code):
             self.is_quick = True
-            return Code(kinds, *held)
-        if not beside.can_build():
-            if os.environ.get(TIER) != KEPT:
-                beside.say(NO_COMPILER)
-            return None
-        path = store.kernel_file(self.key(kinds), machine.processor())
-        found = store.load(path)
-        if found is not None:
-            self.is_quick = True
-            return Code(kinds, found[0], machine.load(found[1], symbol))
-        if os.environ.get(TIER) == KEPT:
-            return None
-        waiting = self._patient or waits()
-        if not waiting:
-            beside.say(BESIDE)
-        return self.waiting(kinds, path, waits=waiting)
+        return found
 
     @property
     def has_source(self) -> bool:
@@ -291,14 +292,18 @@ class Kernel(Generic[P, R]):
         )
 
     def key(self, kinds: Sequence[Kind]) -> str:
-        """Return what names the machine code for arguments of some kinds (`kernels.store.key_of`)."""
-        return store.key_of(Path(self._function.__code__.co_filename), self._function.__qualname__, kinds)
+        """Return what names the machine code for arguments of some kinds (`kernels.sources.key_of`)."""
+        return sources.key_of(self.file, self.name, kinds)
 
-    def waiting(self, kinds: Sequence[Kind], path: Path, *, waits: bool) -> beside.Waiting:
-        """Tell a builder that machine code is wanted, in the file `path`."""
-        own = self._function
-        file = Path(own.__code__.co_filename)
-        return beside.Waiting(own.__module__, own.__qualname__, file, kinds, path, waits=waits)
+    @property
+    def name(self) -> str:
+        """The kernel's name in its module."""
+        return self._function.__qualname__
+
+    @property
+    def file(self) -> Path:
+        """The source that holds the kernel."""
+        return Path(self._function.__code__.co_filename)
 
     def _whole(self, args: tuple[Any, ...], named: dict[str, Any]) -> tuple[Any, ...]:
         """Return all arguments in order, those that take any number of them as one tuple."""
@@ -313,6 +318,13 @@ class Kernel(Generic[P, R]):
     def _shape(self) -> tuple[int, bool]:
         code = self._function.__code__
         return code.co_argcount, bool(code.co_flags & inspect.CO_VARARGS)
+
+
+@cache
+def say(text: str) -> None:
+    """Say something once on standard error, in the first process of a program alone."""
+    if multiprocessing.parent_process() is None:
+        print(f"dubins-traffic: {text}", file=sys.stderr, flush=True)
 
 
 def _plain_names(function: FunctionType) -> dict[str, Any]:

@@ -4,51 +4,33 @@ from __future__ import annotations
 
 import hashlib
 import re
-import sys
+from collections.abc import Sequence
 from functools import cache
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+
+from dubins_traffic.kernels.kinds import Kind
 
 PACKAGE = Path(__file__).resolve().parents[1]
 """The folder of the package."""
 
-LIBRARIES = ("numba", "llvmlite", "numpy")
-"""What compiles kernels."""
-
 MAKERS = frozenset(
-    PACKAGE / "kernels" / f"{name}.py" for name in ("compiler", "frontend", "kinds", "lowering")
+    PACKAGE / name
+    for name in (
+        "compiling/compiler.py",
+        "compiling/frontend.py",
+        "compiling/lowering.py",
+        "kernels/kinds.py",
+    )
 )
 """The sources that say how kernels are compiled and called: they count for all kernels."""
 
 KEEPERS = frozenset(
     PACKAGE / "kernels" / f"{name}.py"
-    for name in (
-        "beside",
-        "builder",
-        "calls",
-        "compile",
-        "folders",
-        "levels",
-        "library",
-        "linking",
-        "machine",
-        "sources",
-        "store",
-    )
+    for name in ("calls", "compile", "folders", "levels", "library", "machine", "sources")
 )
-"""The sources that say when kernels are compiled and where they are kept, which changes no machine code."""
+"""The sources that say when machine code is looked for, and where, which changes none of it."""
 
 _IMPORT = re.compile(rb"^\s*from dubins_traffic\.([\w.]+) import ", re.MULTILINE)
-
-
-@cache
-def versions_hash() -> str:
-    """Return a hash of the versions of what compiles kernels, and of how it is done here."""
-    digest = hashlib.sha256(sys.version.encode())
-    for name in LIBRARIES:
-        digest.update(_version(name).encode())
-    digest.update(makers_hash().encode())
-    return digest.hexdigest()[:16]
 
 
 @cache
@@ -71,6 +53,30 @@ def source_hash(file: Path) -> str:
     return digest.hexdigest()[:16]
 
 
+def key_of(file: Path, name: str, kinds: Sequence[Kind]) -> str:
+    """Return what names a kernel, whatever it is compiled for: a folder of its source and a file.
+
+    Parameters
+    ----------
+    file : Path
+        The source that holds the kernel, of this package or another.
+    name : str
+        Name of the kernel in it.
+    kinds : sequence of Kind
+        Those of its arguments.
+    """
+    module = (
+        ".".join(file.relative_to(PACKAGE).with_suffix("").parts) if PACKAGE in file.parents else file.stem
+    )
+    digest = hashlib.sha256(repr(tuple(kinds)).encode()).hexdigest()[:24]
+    return f"{module}-{source_hash(file)}/{name}-{digest}"
+
+
+def symbol(key: str) -> str:
+    """Return the name of the function in a kernel's machine code."""
+    return "kernel_" + hashlib.sha256(key.encode()).hexdigest()[:24]
+
+
 def imported(file: Path) -> set[Path]:
     """Return `file` and all files of the package that it imports, over any number of steps."""
     found = {file}
@@ -81,13 +87,6 @@ def imported(file: Path) -> set[Path]:
                 found.add(other)
                 waiting.append(other)
     return found
-
-
-def _version(name: str) -> str:
-    try:
-        return version(name)
-    except PackageNotFoundError:
-        return ""
 
 
 @cache

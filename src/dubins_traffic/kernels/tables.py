@@ -10,7 +10,7 @@
 
 Numba hands a tuple of arrays from function to function by value: hundreds of numbers, at which it works in every
 function that is called, and which it copies out of Python's tuple at every call. What a kernel gets of a `Tables` is
-the place where all that is known of its arrays stands (`kernels.lowering`), however many they are.
+the place where all that is known of its arrays stands (`compiling.lowering`), however many they are.
 """
 
 from __future__ import annotations

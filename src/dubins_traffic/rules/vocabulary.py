@@ -1,6 +1,6 @@
 """The propositions that formulas about the trials of a problem may use.
 
-i stands for the name of a car, x and y for a lattice point. Beside those of the task (`rules.task`) there are:
+i stands for the name of a car, x and y for a lattice point. Beside those of the task (`specifications.task`) there are:
 
 ============================  ======================================================================================
 ``WORD_i``                    a flag of the car (`rules.propositions`), such as ``still_i``, ``blocked_i``; those of the

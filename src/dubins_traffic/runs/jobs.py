@@ -21,7 +21,7 @@ from dubins_traffic.simulators import registry as simulators
 if TYPE_CHECKING:
     from dubins_traffic.cars.state import Frames
     from dubins_traffic.problem.configuration import Configuration
-    from dubins_traffic.protocols import Ending
+    from dubins_traffic.protocols import Ending, Watcher
 
 MOST_BARREN = 3
 """Number of times in a row that processes may end without a result before none is started again."""
@@ -55,8 +55,8 @@ class Job:
             raise DubinsTrafficError("a job needs an instance or a configuration")
         return draw(self.configuration, self.seed, self.trial)
 
-    def run(self, cancelled: Cancelled | None = None) -> Result:
-        """Run the job here; `cancelled` interrupts it after at most one simulated second."""
+    def run(self, cancelled: Cancelled | None = None, watchers: Sequence[Watcher] = ()) -> Result:
+        """Run the job here, shown to `watchers`; `cancelled` interrupts it after at most one simulated second."""
         instance = self.drawn()
         return run_trial(
             instance,
@@ -69,6 +69,7 @@ class Job:
             sketch=False,
             name=self.controller,
             metrics=self.metrics,
+            watchers=watchers,
         )
 
     @property
@@ -96,12 +97,13 @@ class _Watch:
         """Do nothing."""
 
 
-def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
+def run_trials(jobs: Sequence[Job], workers: int = 1, watchers: Sequence[Watcher] = ()) -> Iterator[Result]:
     """Run `jobs` and yield the result of each when it has ended.
 
     With one worker they run here, in order; with more, in that many processes. What a trial does never depends on
-    where or when it ran. On Ctrl-C running trials end as interrupted, nothing new begins, and KeyboardInterrupt
-    is raised after the results that were ready have been yielded.
+    where or when it ran. Trials that are shown to `watchers` run here, too. On Ctrl-C running trials end as
+    interrupted, nothing new begins, and KeyboardInterrupt is raised after the results that were ready have been
+    yielded.
 
     Raises
     ------
@@ -114,11 +116,11 @@ def run_trials(jobs: Sequence[Job], workers: int = 1) -> Iterator[Result]:
     with ExitStack() as held:
         for folder in sorted({job.record.parent for job in jobs if job.record is not None}):
             held.enter_context(locked(folder))
-        if workers > 1 and len(jobs) > 1:
+        if workers > 1 and len(jobs) > 1 and not watchers:
             yield from _in_processes(jobs, workers)
             return
         for job in jobs:
-            yield job.run()
+            yield job.run(watchers=watchers)
 
 
 def _in_processes(jobs: Sequence[Job], workers: int) -> Iterator[Result]:

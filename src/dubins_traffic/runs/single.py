@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -15,14 +15,13 @@ from dubins_traffic.outside import put_back
 from dubins_traffic.problem.draw import check_numbers
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.protocols import Controller, Driver, Ending, Simulator, Sink
+from dubins_traffic.protocols import Controller, Driver, Ending, Link, Simulator, Sink, Watcher
 from dubins_traffic.record import wall
 from dubins_traffic.record.writer import RecordWriter
 from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import MetricSpec
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators import registry as simulators
-from dubins_traffic.transports.link import Link, LocalController, RemoteAgents, RemoteController
 from dubins_traffic.trial.run import run
 from dubins_traffic.trial.trial import Trial as BareTrial
 from dubins_traffic.viewer.notebook import trial_html
@@ -44,6 +43,8 @@ class Trial(BareTrial):
         Replaces the simulator that the instance names.
     link : Link, optional
         Connects to the drivers of remote cars.
+    watchers : sequence of Watcher
+        Are shown every frame at once.
 
     Raises
     ------
@@ -68,6 +69,7 @@ class Trial(BareTrial):
         record: Path | str | None = None,
         simulator: Simulator | None = None,
         link: Link | None = None,
+        watchers: Sequence[Watcher] = (),
     ) -> None:
         agents = _agents(instance, link)
         writer = () if record is None else (RecordWriter(record),)
@@ -76,7 +78,8 @@ class Trial(BareTrial):
             simulator=simulator or simulators.load(instance.simulator),
             agents=agents,
             sinks=(*writer, *sinks),
-            watchers=() if link is None else (link,),
+            watchers=watchers if link is None else (link, *watchers),
+            linked=link is not None,
         )
 
     def fork(
@@ -165,7 +168,7 @@ def _agents(instance: Instance, link: Link | None) -> Sequence[Driver]:
             expected="a built-in type, or a run over a transport, such as dubins-traffic ros1 run",
         )
     local: list[Driver] = [Fleet()] if len(remote) < len(instance.e_agents) else []
-    return local if link is None or not remote else [*local, RemoteAgents(link)]
+    return local if link is None or not remote else [*local, link.agents()]
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,6 +212,7 @@ def run_trial(
     sketch: bool = True,
     name: str | None = None,
     metrics: Sequence[MetricSpec] = (),
+    watchers: Sequence[Watcher] = (),
 ) -> Result:
     """Run one controller on one instance, and score it.
 
@@ -237,6 +241,8 @@ def run_trial(
         Name of the controller in record and score; by default the name by which it was given, or that of its class.
     metrics : sequence of str or callable
         Further metrics: names, ``module:Class``, ``path/to/file.py:Class``, or classes (docs/extending/metric.md).
+    watchers : sequence of Watcher
+        Are shown every frame at once.
 
     Raises
     ------
@@ -255,7 +261,13 @@ def run_trial(
     try:
         with (
             put_back(),
-            Trial(instance, sinks=(*first, *drawn, scorer, *sinks), link=link, simulator=simulator) as trial,
+            Trial(
+                instance,
+                sinks=(*first, *drawn, scorer, *sinks),
+                link=link,
+                simulator=simulator,
+                watchers=watchers,
+            ) as trial,
         ):
             try:
                 ending, measured = run(trial, driver, deadline)
@@ -263,7 +275,7 @@ def run_trial(
                 if link is not None and trial.ending is not None:
                     link.finish(trial.ending)
         if link is not None:
-            measured = _over(link, measured)
+            measured = link.completed(measured)
     finally:
         if writer is not None:
             writer.close()
@@ -277,17 +289,10 @@ def run_trial(
 def _driver(controller: str | Controller, link: Link | None) -> tuple[str, Controller]:
     """Return the name of the ego's controller, and the controller."""
     if link is not None and link.ego:
-        name, driver = link.transport.name, RemoteController(link)
+        name, driver = link.name, link.controller()
         if isinstance(controller, str) and controllers.is_shielded(controller):
             return controllers.shielded(name), controllers.under_shield(driver, controller)
         return name, driver
     name = controller if isinstance(controller, str) else type(controller).__name__
     driver = controllers.load(controller) if isinstance(controller, str) else controller
-    return name, driver if link is None else LocalController(link, driver)
-
-
-def _over(link: Link, measured: wall.Wall) -> wall.Wall:
-    """Return the wall-clock figures of the trial with those of the link."""
-    begin = link.time_to_begin if link.ego else measured.time_to_begin_s
-    reproducible = measured.reproducible and link.clock.lockstep
-    return replace(measured, time_to_begin_s=begin, reproducible=reproducible, transport=link.report())
+    return name, driver if link is None else link.beside(driver)

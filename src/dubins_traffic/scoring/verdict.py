@@ -243,7 +243,7 @@ def reach_verdict(
         How the trial ended; None while it runs, and for a record that was cut off.
     """
     rate = instance.problem.rate
-    violations = tuple([_violation(instance, breach) for breach in breaches])
+    violations = tuple([violation_of(instance, breach) for breach in breaches])
     own = [breach for breach in breaches if breach.car == EGO]
     fall = first_fall(breaches, rules, rate) if breaches else None
     gap = max([goal.longest_gap_s for goal in visits.goals], default=None)
@@ -277,7 +277,8 @@ def reach_verdict(
     )
 
 
-def _violation(instance: Instance, breach: Breach) -> Violation:
+def violation_of(instance: Instance, breach: Breach) -> Violation:
+    """Return a breach with the names of the car and of the place."""
     network, rate = instance.problem.network, instance.problem.rate
     segment = None
     if breach.lane >= 0:

@@ -8,7 +8,6 @@ import socket
 import subprocess
 import threading
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import FrameType
 
@@ -17,50 +16,16 @@ import uvicorn
 from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
-from dubins_traffic.errors import InputError
+from dubins_traffic.live.listening import address_of
 from dubins_traffic.service import accounts, organising
 from dubins_traffic.service.client import TOKEN
+from dubins_traffic.service.database_tables import Account, Code, Token
 from dubins_traffic.service.housekeeping import Housekeeper
 from dubins_traffic.service.service import Service, competition_of
-from dubins_traffic.service.tables import Account, Code, Token
 from dubins_traffic.service.web.app import create_app
 
 log = structlog.get_logger("dubins_traffic.service")
 WATCH_S = 1.0
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where to listen: host and port, 0 for any that is free."""
-
-    host: str = "127.0.0.1"
-    port: int = 8000
-
-
-def listen(place: Place) -> socket.socket:
-    """Return a socket that listens at a place.
-
-    Raises
-    ------
-    InputError
-        If somebody else does, or it is no place of this machine.
-    """
-    try:
-        family = socket.getaddrinfo(place.host, place.port, type=socket.SOCK_STREAM)[0][0]
-        opened = socket.create_server((place.host, place.port), family=family, backlog=1024)
-    except OSError as error:
-        raise InputError(
-            f"can't listen ({error.strerror or error})", file="--port", value=place.port
-        ) from None
-    opened.set_inheritable(False)
-    return opened
-
-
-def address_of(opened: socket.socket) -> str:
-    """Return the address of what a socket listens to."""
-    name, port = opened.getsockname()[:2]
-    host = {"0.0.0.0": "127.0.0.1", "::": "::1"}.get(str(name), str(name))
-    return f"http://[{host}]:{port}" if ":" in host else f"http://{host}:{port}"
 
 
 def prepare(service: Service, competitions: list[Path], url: str) -> str | None:
@@ -191,16 +156,10 @@ def serve(
 
     Parameters
     ----------
-    service : Service
-        Whose tables are up to date.
-    opened : socket
-        Where to listen.
     workers : int
         How many workers to keep beside the server.
     program : sequence of str
         The command of a worker, without its arguments.
-    trust : bool
-        As for workers.
     """
     config = uvicorn.Config(
         create_app(service),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from dubins_traffic.above import ABOVE
 from dubins_traffic.errors import InputError
 from dubins_traffic.protocols import Simulator
 
@@ -39,10 +40,8 @@ def load(name: str, *, show: bool = False) -> Simulator:
         from dubins_traffic.simulators.embedded import Embedded
 
         return Embedded()
-    if name == "gazebo":
-        from dubins_traffic.simulators.gazebo.simulator import Gazebo
-
-        return Gazebo(show=show)
+    if name in _DESCRIPTIONS:
+        return ABOVE.parts("simulators")[name]()(show=show)
     raise InputError(
         "unknown simulator", field="simulator", value=name, expected=f"one of {', '.join(_DESCRIPTIONS)}"
     )

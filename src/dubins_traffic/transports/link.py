@@ -9,12 +9,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from time import monotonic
 from typing import TYPE_CHECKING, Any, Self
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State
+from dubins_traffic.cars.state import EGO, Command, Contact, Labels, Observation, State
 from dubins_traffic.errors import InputError, PeerError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.observations.senses import Senses
@@ -23,6 +24,7 @@ from dubins_traffic.protocols import (
     Clock,
     Closes,
     Controller,
+    Driver,
     End,
     Ending,
     Looks,
@@ -37,6 +39,7 @@ from dubins_traffic.transports.inbox import Inbox, Punctuality, Slot
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
+    from dubins_traffic.record.wall import Wall
 
 EGO_NAME = "ego"
 IDLE = 0.1
@@ -84,7 +87,7 @@ class Link:
         self._remote = [agent.name for agent in instance.e_agents if agent.kind == REMOTE]
         if self.ego:
             self._remote.insert(0, EGO_NAME)
-        self._sights = Sights(instance)
+        self._sights = CarViews(instance)
         self._running = False
         self._moving = False
         self._announced = 0.0
@@ -94,7 +97,14 @@ class Link:
         self.inbox.expect(self._remote)
         self.transport.begin(instance, self._remote)
 
-    def watch(self, tick: int, state: State, labels: Labels, observe: Callable[[], Observation]) -> None:
+    def watch(
+        self,
+        tick: int,
+        state: State,
+        labels: Labels,
+        contacts: Sequence[Contact],  # noqa: ARG002  # drivers are sent poses and labels
+        observe: Callable[[], Observation],
+    ) -> None:
         """Send frame `tick` when it is due."""
         if self._running:
             due = self.clock.due(tick)
@@ -126,10 +136,7 @@ class Link:
     def command(self, car: str, tick: int) -> tuple[float, float]:
         """Return the speed and yaw rate of `car` that answer frame `tick`, or that are in force.
 
-        Raises
-        ------
-        PeerError
-            If there are none: the peer is silent, gone or at fault, or all is to end.
+        PeerError if there are none: the peer is silent, gone or at fault, or all is to end.
         """
         slot = self.inbox.slot(car)
         until = self.clock.until(tick, self._sent)
@@ -170,6 +177,29 @@ class Link:
     def close(self) -> None:
         """Close the transport."""
         self.transport.close()
+
+    @property
+    def name(self) -> str:
+        """Name of the transport."""
+        return self.transport.name
+
+    def controller(self) -> Controller:
+        """Return the ego's driver elsewhere."""
+        return RemoteController(self)
+
+    def beside(self, controller: Controller) -> Controller:
+        """Return a controller of this process whose start tells the peers that the trial begins."""
+        return LocalController(self, controller)
+
+    def agents(self) -> Driver:
+        """Return the driver of the e-agents that are driven elsewhere."""
+        return RemoteAgents(self)
+
+    def completed(self, measured: Wall) -> Wall:
+        """Return the wall-clock figures of the trial with those of the link."""
+        begin = self.time_to_begin if self.ego else measured.time_to_begin_s
+        reproducible = measured.reproducible and self.clock.lockstep
+        return replace(measured, time_to_begin_s=begin, reproducible=reproducible, transport=self.report())
 
     @property
     def running(self) -> bool:
@@ -408,28 +438,22 @@ def onward(before: State, seconds: float) -> State:
     return State(x, y, c, s, before.speed, before.yaw_rate, before.count)
 
 
-class Sights:
-    """What each car of one trial sees.
-
-    Parameters
-    ----------
-    instance : Instance
-        The instance of the trial.
-    """
+class CarViews:
+    """What each car of one trial sees."""
 
     def __init__(self, instance: Instance) -> None:
         self._instance = instance
         self._senses: dict[int, Senses] = {}
 
-    def take(self, tick: int, state: State, labels: Labels, own: Callable[[], Observation]) -> None:
+    def take(self, tick: int, state: State, labels: Labels, observe_ego: Callable[[], Observation]) -> None:
         """Take the next frame; `own` returns the ego's observation of it."""
-        self._tick, self._state, self._labels, self._own = tick, state, labels, own
+        self._tick, self._state, self._labels, self._observe_ego = tick, state, labels, observe_ego
         self._seen: dict[int, Observation] = {}
 
     def observe(self, car: int) -> Observation:
         """Return the observation of `car` in the present frame; the ego's is the trial's own."""
         if car == EGO:
-            return self._own()
+            return self._observe_ego()
         if car not in self._seen:
             self._seen[car] = self.sense(car, self._state)
         return self._seen[car]

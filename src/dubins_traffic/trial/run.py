@@ -16,7 +16,7 @@ def run(trial: Trial, controller: Controller, deadline: float | None = None) -> 
     A controller that raises, gives up (None), answers nonsense, or takes longer than `deadline` seconds for one
     `act` ends its own trial with a named reason; nothing is raised but what interrupts the program.
     """
-    seat = Seat(controller, deadline, linked=trial.is_watched)
+    seat = Seat(controller, deadline, linked=trial.linked)
     with heard_between_frames():
         try:
             seat.start(trial.instance.problem, trial.tick)

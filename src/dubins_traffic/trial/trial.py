@@ -39,6 +39,8 @@ class Trial:
         Receive instance, frames, contacts, events and ending.
     watchers : sequence of Watcher
         Are shown every frame at once.
+    linked : bool
+        Whether one of them takes part from elsewhere and may end the trial as it likes.
 
     Examples
     --------
@@ -55,8 +57,10 @@ class Trial:
         agents: Sequence[Driver] = (),
         sinks: Sequence[Sink] = (),
         watchers: Sequence[Watcher] = (),
+        linked: bool = False,
     ) -> None:
         self.instance = instance
+        self.linked = linked
         self.ending: Ending | None = None
         self._simulator = simulator
         self._agents = tuple(agents)
@@ -79,17 +83,12 @@ class Trial:
         self._observation: Observation | None = None
         for watcher in self._watchers:
             watcher.begin(instance)
-            watcher.watch(0, self._state, self._labels, self._observe)
+            watcher.watch(0, self._state, self._labels, (), self._observe)
 
     @property
     def tick(self) -> int:
         """Number of the present frame."""
         return self._tick
-
-    @property
-    def is_watched(self) -> bool:
-        """Whether somebody is shown every frame at once, such as those elsewhere who drive or look on."""
-        return bool(self._watchers)
 
     @property
     def sinks(self) -> Sequence[Sink]:
@@ -150,7 +149,7 @@ class Trial:
         elif contacts and self.instance.end_on_collision:
             self._end_on_collision(contacts)
         for watcher in self._watchers:
-            watcher.watch(self._tick, self._state, self._labels, self._observe)
+            watcher.watch(self._tick, self._state, self._labels, contacts, self._observe)
         return contacts
 
     def fork(self, seed: int | None = None) -> Self:

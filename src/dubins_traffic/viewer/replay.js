@@ -5,9 +5,10 @@ const SWITCHES = { f: "follow", t: "trails", l: "labels", n: "lanes", r: "sensin
 const PANEL_PERIOD = 100;
 const KEY_PAN = 60;
 const VIEW_WIDTHS = 8;
+const LATE_SECONDS = 0.3;
 
 const trial = new Trial(JSON.parse(find("data").textContent));
-const state = { time: trial.begin ?? trial.start, playing: false, chosen: 0, speed: 1, fitted: true, panelAt: 0, last: null };
+const state = { time: trial.begin ?? trial.start, playing: false, follows: false, chosen: 0, speed: 1, fitted: true, panelAt: 0, last: null, pictures: 0 };
 const map = new MapView(find("map"), trial);
 const show = {};
 const marks = new Marks(trial);
@@ -16,19 +17,19 @@ const panel = new Panel(trial, marks, show, { choose, go, filter });
 const slider = find("slider");
 let asked = false;
 
-Object.assign(slider, { min: trial.start, max: trial.end, step: 1 / trial.rate, value: trial.start });
+Object.assign(slider, { min: trial.start, max: trial.last, step: 1 / trial.rate, value: trial.start });
 
 function draw() {
   map.draw(state.time, state.chosen, show);
+  state.pictures += 1;
 }
 
 function refresh(force = true) {
-  slider.value = state.time;
-  const words = `${decimals(state.time, 2)} s of ${decimals(trial.end, 2)} s`;
-  slider.setAttribute("aria-valuetext", words);
-  find("clock").textContent = `${decimals(state.time, 2)} / ${decimals(trial.end, 2)} s`;
   const now = performance.now();
   if (force || now - state.panelAt >= PANEL_PERIOD) {
+    slider.value = state.time;
+    slider.setAttribute("aria-valuetext", `${decimals(state.time, 2)} s of ${decimals(trial.last, 2)} s`);
+    find("clock").textContent = `${decimals(state.time, 2)} / ${decimals(trial.last, 2)} s`;
     panel.update(state.time, state.chosen);
     state.panelAt = now;
   }
@@ -40,8 +41,10 @@ function tick(now) {
   if (!state.playing) return;
   const passed = state.last === null ? 0 : (now - state.last) / 1000;
   state.last = now;
-  state.time = Math.min(trial.end, state.time + Math.min(passed, 0.25) * state.speed);
-  if (state.time >= trial.end) pause();
+  const speed = state.follows ? trial.live.pace : state.speed;
+  state.time = Math.min(trial.end, state.time + Math.min(passed, 0.25) * speed);
+  if (state.follows && trial.end - state.time > LATE_SECONDS * speed) state.time = trial.end;
+  if (state.time >= trial.end && !trial.running) pause();
   else ask();
   refresh(!state.playing);
 }
@@ -58,8 +61,11 @@ function reflect() {
 }
 
 function play() {
-  if (state.playing || trial.frames < 2) return;
-  if (state.time >= trial.end) state.time = trial.start;
+  if (state.playing || (trial.frames < 2 && !trial.running)) return;
+  if (state.time >= trial.end) {
+    if (trial.running) state.follows = true;
+    else state.time = trial.start;
+  }
   state.playing = true;
   state.last = null;
   reflect();
@@ -67,7 +73,7 @@ function play() {
 }
 
 function pause() {
-  state.playing = false;
+  state.playing = state.follows = false;
   reflect();
   refresh();
 }
@@ -79,6 +85,7 @@ function toggle() {
 
 function seek(time) {
   state.time = Math.min(Math.max(Number(time), trial.start), trial.end);
+  state.follows = state.playing && trial.running && state.time >= trial.end;
   refresh();
 }
 
@@ -315,6 +322,9 @@ window.replay = {
   get playing() { return state.playing; },
   get start() { return trial.start; },
   get end() { return trial.end; },
+  get frames() { return trial.frames; },
+  get running() { return trial.running === true; },
+  get pictures() { return state.pictures; },
   get frame() { return trial.place(state.time)[0]; },
   get chosen() { return state.chosen; },
   get mark() { return marks.chosen; },

@@ -117,31 +117,54 @@ def replay_page(
     if at is not None and not frames.first / frames.rate <= at <= last:
         expected = f"a second of the trial, from {frames.first / frames.rate:g} to {last:g}"
         raise InputError("not in the trial", file="--at", value=at, expected=expected)
-    title = f"Trial {instance.trial} of seed {instance.seed}"
-    style = palette.style_sheet() + part("viewer/replay.css")
-    scripts = [f"const LOOKS = {json.dumps(LOOKS)};", *(part(f"viewer/{name}") for name in SCRIPTS)]
-    script = "\n".join(["(() => {", '"use strict";', *scripts, "})();"])
     breaches = [] if verdict is None else breach_marks(instance, verdict.violations)
     every = marks_of(instance, frames, [*marks, *breaches])
-    document = _document(title, instance, frames, ending, summary or {}, every)
+    document = document_of(instance, frames, ending, summary, every)
     document |= {} if at is None else {"begin": at}
     document["verdict"] = None if verdict is None else _verdict(instance, verdict, every)
-    return render("viewer/replay.html", title=title, style=style, script=script, document=document)
+    return page_of(document)
 
 
-def _document(
-    title: str,
+def page_of(
+    document: Mapping[str, Any],
+    *,
+    template: str = "viewer/replay.html",
+    style: str = "",
+    scripts: Sequence[str] = (),
+    **given: object,
+) -> str:
+    """Return a page with the map, the timeline and the panel of a trial.
+
+    Parameters
+    ----------
+    document : Mapping
+        What `document_of` returns.
+    template : str
+        The page of a replay, or one that extends it; it is given all of `given`.
+    style : str
+        Its style sheet, after that of the replay.
+    scripts : sequence of str
+        Its scripts, after those of the replay and in the same scope.
+    """
+    parts = [part(f"viewer/{name}") for name in SCRIPTS]
+    body = [f"const LOOKS = {json.dumps(LOOKS)};", *parts, *scripts]
+    script = "\n".join(["(() => {", '"use strict";', *body, "})();"])
+    sheet = palette.style_sheet() + part("viewer/replay.css") + style
+    return render(template, title=document["title"], style=sheet, script=script, document=document, **given)
+
+
+def document_of(
     instance: Instance,
     frames: Frames,
     ending: Ending | None,
-    summary: Mapping[str, object],
-    marks: Sequence[Mark],
+    summary: Mapping[str, object] | None = None,
+    marks: Sequence[Mark] = (),
 ) -> dict[str, Any]:
+    """Return what the script of a page is given of a trial; points are relative to `origin_of` its roads."""
     problem = instance.problem
-    points = problem.network.points
-    origin: Floats = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    origin = origin_of(problem)
     return {
-        "title": title,
+        "title": f"Trial {instance.trial} of seed {instance.seed}",
         "rate": frames.rate,
         "first": frames.first,
         "frames": len(frames),
@@ -165,10 +188,23 @@ def _document(
         "obstacles": [_obstacle(obstacle, origin) for obstacle in problem.obstacles],
         "series": _series(frames, origin),
         "ending": None if ending is None else {"end": ending.end.value, "detail": ending.detail},
-        "summary": [[_caption(name), _shown(value)] for name, value in summary.items()],
+        "summary": shown_summary(summary or {}),
         "flags": NAMES,
-        "marks": [_mark(mark, origin) for mark in marks],
+        "marks": [mark_of(mark, origin) for mark in marks],
+        "verdict": None,
     }
+
+
+def origin_of(problem: Problem) -> Floats:
+    """Return the middle of the roads, (2,): single precision is enough for lengths from there."""
+    points = problem.network.points
+    middle: Floats = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    return middle
+
+
+def shown_summary(summary: Mapping[str, object]) -> list[list[str]]:
+    """Return a score, name to value, as pairs of texts."""
+    return [[_caption(name), _shown(value)] for name, value in summary.items()]
 
 
 def _roads(problem: Problem, origin: Floats) -> dict[str, Any]:
@@ -241,7 +277,8 @@ def _verdict(instance: Instance, verdict: Verdict, marks: Sequence[Mark]) -> dic
     }
 
 
-def _mark(mark: Mark, origin: Floats) -> dict[str, Any]:
+def mark_of(mark: Mark, origin: Floats) -> dict[str, Any]:
+    """Return a mark as the script of a page reads it."""
     point = (
         None if mark.point is None else [mark.point[0] - float(origin[0]), mark.point[1] - float(origin[1])]
     )

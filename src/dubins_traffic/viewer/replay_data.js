@@ -29,6 +29,11 @@ function pairs(values, size) {
   return rows;
 }
 
+const SERIES = ["x", "y", "heading", "speed", "yawRate", "segment", "at", "bits"];
+const INTEGERS = 5;
+
+// The series are car after car: `stride` frames of each, of which the first `frames` are there; while a trial runs more
+// come, until `last`, the time of the last one that is planned.
 class Trial {
   constructor({ roads, series, first, ...rest }) {
     Object.assign(this, rest);
@@ -48,10 +53,62 @@ class Trial {
     for (const name of ["segment", "at", "bits"]) {
       this[name] = unpackRuns(series[name], this.cars.length, this.frames);
     }
+    this.stride = this.frames;
+    this.last = this.end;
+    if (this.live) this.reserve(this.live.frames);
     this.reach = this.body.radius ?? Math.hypot(this.body.length, this.body.width) / 2;
     for (const mark of this.marks) mark.group = groupOf(mark);
     this.contacts = this.marks.filter((mark) => mark.kind === "contact" && mark.point);
     this.breaches = this.marks.filter((mark) => mark.kind === "breach" && mark.point);
+  }
+
+  // Make room for all frames of a trial that runs.
+  reserve(frames) {
+    for (const name of SERIES) {
+      const longer = new this[name].constructor(this.cars.length * frames);
+      this.cars.forEach((_, car) => longer.set(this[name].subarray(car * this.stride, car * this.stride + this.frames), car * frames));
+      this[name] = longer;
+    }
+    this.stride = frames;
+    this.last = this.start + (frames - 1) / this.rate;
+    this.running = true;
+  }
+
+  // Append frames that have come; their form is that of Show.tick in live/show.py.
+  append(buffer) {
+    const cars = this.cars.length;
+    const size = 4 * (1 + SERIES.length * cars);
+    const view = new DataView(buffer);
+    for (let place = 0; place < buffer.byteLength; place += size) {
+      const frame = view.getUint32(place, true);
+      SERIES.forEach((name, row) => {
+        for (let car = 0; car < cars; car += 1) {
+          const at = place + 4 * (1 + row * cars + car);
+          const value = row < INTEGERS ? view.getFloat32(at, true) : view.getInt32(at, true);
+          this[name][car * this.stride + frame] = name === "heading" ? Math.round((value * HEADING_STEPS) / Math.PI) : value;
+        }
+      });
+      this.frames = frame + 1;
+    }
+    this.end = this.time(this.frames - 1);
+    this.countVisits();
+  }
+
+  // Note the visits of goals in frames that have come.
+  countVisits() {
+    const { visits, vertices } = this.goals;
+    for (this.seen ??= 1; this.seen < this.frames; this.seen += 1) {
+      const at = this.at[this.seen];
+      if (at !== this.at[this.seen - 1] && vertices.includes(at)) visits.push([this.seen, at]);
+    }
+  }
+
+  // Take a mark that has come; marks come in order of time.
+  addMark(mark) {
+    mark.group = groupOf(mark);
+    this.marks.push(mark);
+    if (mark.kind === "contact" && mark.point) this.contacts.push(mark);
+    if (mark.kind === "breach" && mark.point) this.breaches.push(mark);
   }
 
   // Number of the last frame at or before the time, and how far the next one is on its way to it.
@@ -68,7 +125,7 @@ class Trial {
   // Position (relative to the origin) and heading between frames; speeds as of the last frame.
   pose(car, time) {
     const [frame, part] = this.place(time);
-    const here = car * this.frames + frame;
+    const here = car * this.stride + frame;
     const next = part > 0 ? here + 1 : here;
     const turn = ((this.heading[next] - this.heading[here] + 3 * HEADING_STEPS) % (2 * HEADING_STEPS)) - HEADING_STEPS;
     return {
@@ -82,7 +139,7 @@ class Trial {
 
   // The labels of 2016: nearest segment, and the intersection whose disc holds the centre.
   labels(car, time) {
-    const here = car * this.frames + this.place(time)[0];
+    const here = car * this.stride + this.place(time)[0];
     const { name } = this.cars[car];
     const segment = this.segments[this.segment[here]];
     const point = this.lattice[this.at[here]];
@@ -96,7 +153,7 @@ class Trial {
 
   // The propositions that hold of a car, by name.
   propositions(car, time) {
-    const bits = this.bits[car * this.frames + this.place(time)[0]];
+    const bits = this.bits[car * this.stride + this.place(time)[0]];
     return Object.keys(this.flags).filter((name) => bits & this.flags[name]);
   }
 

@@ -17,8 +17,11 @@ class Marks {
   constructor(trial) {
     this.trial = trial;
     this.chosen = null;
-    this.counts = {};
-    for (const mark of trial.marks) this.counts[mark.group] = (this.counts[mark.group] ?? 0) + 1;
+  }
+
+  // How many marks of a group there are.
+  count(group) {
+    return this.trial.marks.filter((mark) => mark.group === group).length;
   }
 
   shown(show) {

@@ -25,22 +25,29 @@ class Panel {
     this.show = show;
     this.go = go;
     find("title").textContent = trial.title;
-    find("ending").textContent = trial.ending
-      ? [`End: ${trial.ending.end.replaceAll("_", " ")}`, trial.ending.detail].filter(Boolean).join(", ")
-      : "The record was cut off";
     this.goals = trial.goals.vertices.map(() => find("goals").appendChild(make("li")));
     find("goals-box").hidden = this.goals.length === 0;
     this.rows = trial.cars.map((car, index) => this.addCar(car, () => choose(index)));
-    for (const [name, value] of trial.summary) find("score").append(make("dt", name), make("dd", value));
-    find("score-box").hidden = trial.summary.length === 0;
     for (const [keys, effect] of KEYS) find("keys").append(make("dt", keys), make("dd", effect));
-    this.addVerdict();
-    for (const [group, name] of Object.entries(GROUPS)) this.addFilter(group, name, filter);
+    find("excuse").addEventListener("click", () => this.go(this.trial.marks[this.trial.verdict.excuse]));
+    this.filters = Object.entries(GROUPS).map(([group, name]) => this.addFilter(group, name, filter));
+    this.showEnd();
     this.listEvents();
   }
 
+  // How the trial ended, its score and the verdict, as far as they are known.
+  showEnd() {
+    const { ending, running, summary } = this.trial;
+    const words = running ? "Running" : "The record was cut off";
+    find("ending").textContent = ending
+      ? [`End: ${ending.end.replaceAll("_", " ")}`, ending.detail].filter(Boolean).join(", ") : words;
+    find("score").replaceChildren(...summary.flatMap(([name, value]) => [make("dt", name), make("dd", value)]));
+    find("score-box").hidden = summary.length === 0;
+    this.showVerdict();
+  }
+
   // What was decided, why, and the way to what excused it.
-  addVerdict() {
+  showVerdict() {
     const { verdict } = this.trial;
     find("verdict-box").hidden = !verdict;
     if (!verdict) return;
@@ -48,25 +55,28 @@ class Panel {
     find("verdict").className = verdict.ruling;
     find("why").textContent = verdict.why;
     find("excuse").hidden = verdict.excuse === null;
-    find("excuse").addEventListener("click", () => this.go(this.trial.marks[verdict.excuse]));
   }
 
   addFilter(group, name, filter) {
-    const count = this.marks.counts[group];
     this.show[group] = true;
-    if (!count) return;
     const label = find("filters").appendChild(make("label", "", group));
     const box = label.appendChild(make("input"));
     Object.assign(box, { type: "checkbox", checked: true, id: `filter-${group}` });
-    label.append(make("i"), make("span", `${name} `), make("small", String(count)));
+    label.append(make("i"), make("span", `${name} `), make("small"));
     box.addEventListener("change", () => {
       this.show[group] = box.checked;
       filter();
     });
+    return { group, label };
   }
 
   // List the marks that are shown, the first `MOST_EVENTS` of them.
   listEvents() {
+    for (const { group, label } of this.filters) {
+      const count = this.marks.count(group);
+      label.hidden = !count;
+      label.lastChild.textContent = String(count);
+    }
     const shown = this.marks.shown(this.show);
     this.listed = shown.slice(0, MOST_EVENTS);
     find("events").replaceChildren();

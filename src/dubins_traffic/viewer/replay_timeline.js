@@ -9,7 +9,7 @@ class Timeline {
     this.canvas = canvas;
     this.trial = trial;
     this.shown = shown;
-    this.span = Math.max(trial.end - trial.start, 1e-9);
+    this.span = Math.max(trial.last - trial.start, 1e-9);
   }
 
   left(time) {

@@ -1,36 +1,27 @@
 """Map formats by name: those that come with the package, those of other packages, and a user's own.
 
 A format reads a text into the fields of RND version 0 (`roads.formats.rnd`), which are checked then; so it knows of
-road networks only their segments, length and transform. A new one is a file beside this one and a line in `BUILT_IN`,
-or a class outside the package (docs/extending/map-format.md).
+road networks only their segments, length and transform. Those of other programs come from the room `maps`, by a line
+for each in `dubins_traffic`; a new one is a file there and such a line, or a class outside the package
+(docs/extending/map-format.md).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from functools import cache
-from importlib import import_module
 from itertools import chain
 from pathlib import Path
 from typing import Any, Protocol, cast, runtime_checkable
 
 from dubins_traffic import outside
+from dubins_traffic.above import ABOVE
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.files import GZIP
 from dubins_traffic.outside import Seam
-from dubins_traffic.roads.formats.rnd import may_be
-from dubins_traffic.roads.formats.xml_text import is_xml, root_name
+from dubins_traffic.roads.formats.rnd import RndJson, RndText, may_be
+from dubins_traffic.roads.formats.xml_root import is_xml, root_name
 
-BUILT_IN = {
-    "rnd-json": ("dubins_traffic.roads.formats.rnd", "RndJson"),
-    "rnd-text": ("dubins_traffic.roads.formats.rnd", "RndText"),
-    "commonroad": ("dubins_traffic.roads.formats.commonroad", "CommonRoad"),
-    "lanelet2": ("dubins_traffic.roads.formats.lanelet2", "Lanelet2"),
-    "osm": ("dubins_traffic.roads.formats.osm", "OpenStreetMap"),
-    "opendrive": ("dubins_traffic.roads.formats.opendrive", "OpenDrive"),
-    "sumo": ("dubins_traffic.roads.formats.sumo", "SumoNet"),
-}
-"""The formats of this package by name: module and class, in the order in which they are asked."""
 LOSSES = "losses"
 """The key under which a network keeps what was lost of the map from which it comes."""
 GROUP = "dubins_traffic.map_formats"
@@ -78,7 +69,7 @@ class ReducesMaps(MapFormat, Protocol):
     """A map format of another program, of which a network can't hold everything."""
 
     def reduced(self, text: str, file: str | None = None) -> tuple[Mapping[str, Any], object]:
-        """Return the RND document of what can be held, and what was lost (`roads.maps.losses.Losses`)."""
+        """Return the RND document of what can be held, and what was lost (`maps.losses.Losses`)."""
         ...
 
 
@@ -197,7 +188,9 @@ def document(form: MapFormat, text: str, file: str | None) -> tuple[Mapping[str,
 
 @cache
 def _built_in() -> Mapping[str, MapFormat]:
-    return {name: getattr(import_module(place), own)() for name, (place, own) in BUILT_IN.items()}
+    """Return the formats of this package by name, in the order in which they are asked."""
+    further = {name: find()() for name, find in ABOVE.parts("map formats").items()}
+    return {"rnd-json": RndJson(), "rnd-text": RndText(), **further}
 
 
 @cache

@@ -1,0 +1,69 @@
+"""`dubins-traffic watch`."""
+
+from __future__ import annotations
+
+import inspect
+from typing import TYPE_CHECKING, Any, get_type_hints
+
+from dubins_traffic.cli import faults, options
+from dubins_traffic.cli.extras import needs
+from dubins_traffic.cli.run import run
+
+if TYPE_CHECKING:
+    from dubins_traffic.record.reader import Record
+
+EXAMPLES = options.examples(
+    "watch town --controller rules",
+    "watch junction --controller my_controller.py:MyController --trials 1 --pace 2",
+    "watch out/trial-0003.mcap",
+    "watch town --no-browser --port 8765",
+)
+_PAGE = ("pace", "port", "no_browser")
+"""Options of the page, by the parameter of `run`; all others say what is run."""
+_HINTS = get_type_hints(run, include_extras=True)
+_PARAMETERS = [
+    own.replace(annotation=_HINTS[own.name])
+    for own in inspect.signature(run).parameters.values()
+    if own.name != "watch"
+]
+
+
+def watch(source: str, **chosen: Any) -> None:
+    """Show trials in a page of the browser as they run, or a record, also one that is still being written.
+
+    It takes the options of `run`; with one of them the trial of a record is run again. Ctrl-C ends it.
+    """
+    from dubins_traffic.record.reader import Record
+    from dubins_traffic.runs.plan import load_runnable
+
+    usual = {own.name: own.default for own in _PARAMETERS}
+    page = {name: chosen[name] for name in _PAGE}
+    if all(value == usual[name] for name, value in chosen.items() if name not in _PAGE):
+        found = load_runnable(source, rnd=None, seed=0)
+        if isinstance(found, Record):
+            _show(source, found, **page)
+            return
+    run(source, watch=True, **chosen)
+
+
+watch.__annotations__ = {own.name: own.annotation for own in _PARAMETERS}
+setattr(watch, "__signature__", inspect.Signature(_PARAMETERS))  # noqa: B010  # a function has none of its own
+
+
+def _show(source: str, record: Record, *, pace: float, port: int, no_browser: bool) -> None:
+    with needs("watching a record in a page", "watch"):
+        from dubins_traffic.live.stage import Stage
+    import typer
+
+    from dubins_traffic.cli.tables import summary
+    from dubins_traffic.live.recorded import show
+    from dubins_traffic.scoring.score import score
+
+    try:
+        with Stage(options.tell, port, opens=not no_browser, pace=pace) as stage:
+            last = show(stage.feed, source, record)
+            scored = score(last)
+            stage.feed.end(last.instance, last.ending, summary(scored), scored.verdict)
+    except KeyboardInterrupt:
+        faults.tell("interrupted")
+        raise typer.Exit(faults.FAILED) from None

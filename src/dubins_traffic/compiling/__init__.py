@@ -1,0 +1,1 @@
+"""What compiles kernels: Numba changed to our ends, the process that compiles beside, and the library it makes."""
