@@ -25,14 +25,20 @@ from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.engine.controlled import BatchView, LanesGroup, Maker
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.learning.flat import FlatObserver
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw, draw_many
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.problem.parts import Disturbances, Laser
 from dubins_traffic.record import reader
+from dubins_traffic.roads.closeness import Finder
+from dubins_traffic.roads.generate import thinned_grid
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.room import clearances
+from dubins_traffic.roads.sketch import Sketcher
 from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.weave import Weaver
 from dubins_traffic.rules.obstacles import place_obstacles
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import score
@@ -68,6 +74,7 @@ def moments() -> Iterator[Callable[[], object]]:
         for name in (driver, shielded[0]):
             yield partial(_together, pair, name)
     yield partial(list, draw_many(load_config("town"), 0, range(MANY)))
+    yield _roads
     yield lambda: LanesGroup(pair, "sure").drive(1)
     visited = "visit_ego_{}_{}".format(*town.problem.goals[0])
     problem = replace(town.problem, laser=Laser(), formulas={**FORMULAS, "again": f"[] <> {visited}"})
@@ -160,6 +167,22 @@ def _navigated(instance: Instance) -> None:
         for tick, seen in enumerate(frames):
             here = navigator.look(Observation(tick, 0.0, pose, Twist(0.0, 0.0), seen, (), None))
             here.line(SECONDS)
+
+
+def _roads() -> None:
+    """Draw and check road networks with tables of their own: calls with kept ones look at no kernel again."""
+    least, draws = clearances(1.0, 0.177, 0.3).in_units(0.3), Draws(0, 0, 1)
+    Sketcher(4, 4, least.length).run(draws, least, 1)
+    Weaver(4, 4).run(draws, least)
+    thinned_grid(draws, 3, 3, 0.2)
+    finder = Finder(2, 1, 2)
+    node, bar = finder.frame.node, finder.frame.bar
+    node["x"][1] = 9.0
+    bar["b"][0] = 1
+    finder.put_bars(np.array([[0.0, 0.0]]), np.array([[9.0, 0.0]]))
+    finder.tight(least)
+    finder.crowded_and_sharp(least)
+    finder.meetings()
 
 
 def _bend() -> None:

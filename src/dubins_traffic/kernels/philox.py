@@ -8,14 +8,12 @@ Products of two 32-bit words fit 64 bits, so that nothing overflows in either mo
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from types import FunctionType
+from typing import Any
 
 import numpy as np
 
 from dubins_traffic.errors import InputError
-
-if TYPE_CHECKING:
-    from typing import Any
 
 M0 = np.uint64(0xD2511F53)
 M1 = np.uint64(0xCD9E8D57)
@@ -37,6 +35,14 @@ def philox4x32(c0: Any, c1: Any, c2: Any, c3: Any, k0: Any, k1: Any) -> tuple[An
     return c0, c1, c2, c3
 
 
+_PLAIN: dict[str, Any] = {
+    name: int(word)
+    for name, word in (("M0", M0), ("M1", M1), ("W0", W0), ("W1", W1), ("LOW", LOW), ("HALF", HALF))
+}
+_plain_philox = FunctionType(philox4x32.__code__, _PLAIN | {"range": range})
+"""The same function on plain integers, in a fifth of the time that NumPy's take where nothing is compiled."""
+
+
 class Draws:
     """A stream of random numbers for drawing instances, without compiled code.
 
@@ -48,6 +54,11 @@ class Draws:
         Number of the trial, 0 <= trial < 2**32.
     stream : int
         What is drawn: each purpose has a stream of its own, 0 <= stream < 2**32.
+
+    Attributes
+    ----------
+    drawn : int
+        How many words have been drawn.
 
     Raises
     ------
@@ -65,19 +76,32 @@ class Draws:
             raise InputError(
                 "not a seed", field="seed", value=seed, expected=f"an integer >= 0 and < {SEEDS}"
             )
-        self._key = (np.uint64(seed & 0xFFFFFFFF), np.uint64(seed >> 32))
-        self._trial = np.uint64(trial)
-        self._stream = np.uint64(stream)
-        self._position = 0
-        self._words: list[int] = []
+        self.seed, self.trial, self.stream = seed, int(trial), int(stream)
+        self.drawn = 0
+        self._block: tuple[int, int, int, int] = (0, 0, 0, 0)
+
+    @property
+    def block(self) -> tuple[int, int, int, int]:
+        """The four words of the position at which the stream stands; any, where it is about to go to the next."""
+        return self._block
+
+    def go_to(self, drawn: int) -> None:
+        """Go on as after so many words."""
+        if drawn & 3:
+            self._block = self._words(drawn >> 2)
+        self.drawn = drawn
 
     def word(self) -> int:
         """Return the next 32 random bits."""
-        if not self._words:
-            block = philox4x32(self._trial, LOW, np.uint64(self._position), self._stream, *self._key)
-            self._words = [int(word) for word in reversed(block)]
-            self._position += 1
-        return self._words.pop()
+        at = self.drawn & 3
+        if not at:
+            self._block = self._words(self.drawn >> 2)
+        self.drawn += 1
+        return self._block[at]
+
+    def _words(self, position: int) -> tuple[int, int, int, int]:
+        key = self.seed & 0xFFFFFFFF, self.seed >> 32
+        return _plain_philox(self.trial, 0xFFFFFFFF, position, self.stream, *key)
 
     def uniform(self, low: float = 0.0, high: float = 1.0) -> float:
         """Return a float in [low, high), on a grid of 2**-53 of the interval."""

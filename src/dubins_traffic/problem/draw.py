@@ -270,7 +270,7 @@ class Recipe:
         wanted = network.random
         if wanted is None:
             raise InputError("missing", field="network", expected="random or grid")
-        slack = settings.rule_parameters.get("segment_slack", SEGMENT_SLACK)
+        slack = self._rules.get("segment_slack", SEGMENT_SLACK)
         try:
             return random_network(
                 draws,

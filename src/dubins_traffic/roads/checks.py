@@ -14,12 +14,11 @@ import numpy as np
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.chains import Corners, Piece, Point, Segment, chain, pieces
+from dubins_traffic.roads.closeness import finder
 from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.room import LARGEST_DEGREE
 from dubins_traffic.roads.surface import covered, pairs
 
-OFF_LATTICE = 0.37
-"""Moves the borders of cells off the lattice, so that roads along it lie in few cells."""
 NEAR = 1e-7
 """Share of the extent of two pieces within which points are one."""
 
@@ -62,13 +61,10 @@ def _check_each(segments: Sequence[Segment]) -> None:
 
 def meetings(segment: Ints) -> Ints:
     """Return the pairs (K, 2) of segments (S, 4) that meet elsewhere than at a common end; the lower number first."""
-    start, end = segment[:, :2].astype(np.float64), segment[:, 2:].astype(np.float64)
-    size = max(1.0, float(np.abs(end - start).max(axis=1).mean()))
-    found: list[Ints] = []
-    for i, j in pairs(*covered(start + OFF_LATTICE, end + OFF_LATTICE, 0.0, size)):
-        bad = (i != j) & _meet(segment[i], segment[j])
-        found.append(np.stack([np.minimum(i, j), np.maximum(i, j)], axis=-1)[bad])
-    return np.unique(np.concatenate(found), axis=0) if found else np.empty((0, 2), dtype=np.int64)
+    own = finder(0, len(segment), 0)
+    own.put_bars(segment[:, :2].astype(np.float64), segment[:, 2:].astype(np.float64))
+    found = own.meetings()[:, 2:]
+    return found[np.lexsort((found[:, 1], found[:, 0]))]
 
 
 def _check_planar(segment: Ints) -> None:
@@ -90,44 +86,21 @@ def _check_apart(segments: Sequence[Segment], corners: Sequence[Corners]) -> Non
         raise _fault(segments, later, problem, "roads that meet at common ends only")
 
 
-def _cross(ax: Ints, ay: Ints, bx: Ints, by: Ints) -> Ints:
-    return ax * by - ay * bx
-
-
-def _sides(p: Ints, q: Ints) -> tuple[Ints, Ints]:
-    """Return on which side of each segment of p (N, 4) the ends of those of q lie: signs."""
-    dx, dy = p[:, 2] - p[:, 0], p[:, 3] - p[:, 1]
-    first = np.sign(_cross(dx, dy, q[:, 0] - p[:, 0], q[:, 1] - p[:, 1]))
-    second = np.sign(_cross(dx, dy, q[:, 2] - p[:, 0], q[:, 3] - p[:, 1]))
-    return first, second
-
-
-def _meet(p: Ints, q: Ints) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Whether segments p and q (N, 4) share a point other than one common end."""
-    p0, p1, q0, q1 = p[:, :2], p[:, 2:], q[:, :2], q[:, 2:]
-    a0, a1 = _sides(p, q)
-    b0, b1 = _sides(q, p)
-    aligned = (a0 == 0) & (a1 == 0)
-    low = np.maximum(np.minimum(p0, p1), np.minimum(q0, q1))
-    high = np.minimum(np.maximum(p0, p1), np.maximum(q0, q1))
-    boxes = (low <= high).all(axis=1)
-    inside = (low < high).any(axis=1)
-    common = np.zeros(len(p), dtype=np.bool_)
-    for one in (p0, p1):
-        for other in (q0, q1):
-            common |= (one == other).all(axis=1)
-    apart = (a0 * a1 <= 0) & (b0 * b1 <= 0) & boxes
-    return np.where(common, aligned & boxes & inside, apart)
-
-
 def _how(p: Ints, q: Ints) -> str:
-    a0, a1 = (int(side[0]) for side in _sides(p[None], q[None]))
-    b0, b1 = (int(side[0]) for side in _sides(q[None], p[None]))
+    """Return how the segment q meets p."""
+    a0, a1 = (_side(p, q[k : k + 2]) for k in (0, 2))
+    b0, b1 = (_side(q, p[k : k + 2]) for k in (0, 2))
     if a0 == a1 == 0:
         return "overlaps"
     if 0 in (a0, a1):
         return "ends in the middle of"
     return "passes through an end of" if 0 in (b0, b1) else "crosses"
+
+
+def _side(p: Ints, point: Ints) -> int:
+    """Return a number that is 0 for a point in line with the segment p."""
+    (x0, y0, x1, y1), (x, y) = p.tolist(), point.tolist()
+    return (x1 - x0) * (y - y0) - (y1 - y0) * (x - x0)
 
 
 def _check_connected(segments: Sequence[Segment]) -> None:

@@ -10,11 +10,11 @@ import numpy as np
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.chains import Bars
+from dubins_traffic.roads.closeness import ROUNDING, Finder, finder
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.room import LEAST_RADIUS, SEGMENT_SLACK, Clearances, clearances
 from dubins_traffic.roads.surface import covered, pairs
 
-ROUNDING = 1e-9
 STRAIGHTENED = 1e-3
 """How far a curve may be from the bars that stand for it where its clearance is measured, metres."""
 TIGHTEST = 3.0
@@ -48,71 +48,44 @@ class Tight(NamedTuple):
 
 def tight(points: Floats, ends: Ints, least: Clearances) -> Tight:
     """Return the places where segments between `points` (V, 2) with `ends` (S, 2) fall short of `least`."""
-    a, b = points[ends[:, 0]], points[ends[:, 1]]
-    short = np.flatnonzero(_norm(b - a) < least.length - ROUNDING)
-    close, beside = _crowded(points, ends, Bars(np.arange(len(ends)), a, b), least)
-    hub, tip, segment = _tips(ends)
-    return Tight(short, close, beside, _sharp(hub, points[tip] - points[hub], segment, least.cosine))
+    bars = Bars(np.arange(len(ends)), points[ends[:, 0]], points[ends[:, 1]])
+    return _told(_finder(points, ends, bars).tight(least))
 
 
 def bent_tight(network: RoadNetwork, least: Clearances) -> Tight:
     """Return the places where a network whose segments bend falls short of `least`."""
-    short = np.flatnonzero(network.lengths < least.length - ROUNDING)
-    bars = network.surface.bars(STRAIGHTENED)
-    close, beside = _crowded(network.points, network.ends, bars, least)
+    own = _finder(network.points, network.ends, network.surface.bars(STRAIGHTENED))
     hub = np.concatenate([network.ends[:, 0], network.ends[:, 1]])
     step = np.concatenate([network.tangents, -network.end_tangents])
     order = np.argsort(hub, kind="stable")
-    segment = order % max(len(network.ends), 1)
-    return Tight(short, close, beside, _sharp(hub[order], step[order], segment, least.cosine))
+    arm = own.frame.arm
+    arm["hub"], arm["segment"] = hub[order], order % max(len(network.ends), 1)
+    arm["dx"], arm["dy"] = (step / _norm(step)[:, None])[order].T
+    short = np.flatnonzero(network.lengths < least.length - ROUNDING)
+    return _told(own.crowded_and_sharp(least))._replace(short=short)
 
 
-def _crowded(points: Floats, ends: Ints, bars: Bars, least: Clearances) -> tuple[Ints, Ints]:
-    """Return the pairs of points that are too close, and of points and segments, which the `bars` stand for."""
-    a, b, count = bars.start, bars.end, len(bars.owner)
-    wide = max(least.apart, least.aside)
-    size = max(wide, float(np.abs(b - a).mean()))
-    rows = covered(np.concatenate([a, points]), np.concatenate([b, points]), 0.5 * wide, size)
-    close: list[Ints] = []
-    beside: list[Ints] = []
-    for first, second in pairs(*rows):
-        low, high = np.minimum(first, second), np.maximum(first, second)
-        apart = (low >= count) & (low < high)
-        couple = np.stack([low[apart], high[apart]], axis=-1) - count
-        gap = _norm(points[couple[:, 0]] - points[couple[:, 1]])
-        close.append(couple[gap < least.apart - ROUNDING])
-        mixed = (low < count) & (high >= count)
-        k, v = low[mixed], high[mixed] - count
-        loose = (ends[bars.owner[k]] != v[:, None]).all(axis=1)
-        k, v = k[loose], v[loose]
-        far = distances(points[v], a[k], b[k])
-        beside.append(np.stack([v, bars.owner[k]], axis=-1)[far < least.aside - ROUNDING])
-    return _distinct(close), _distinct(beside)
+def _finder(points: Floats, ends: Ints, bars: Bars) -> Finder:
+    """Return what finds what falls short in a network of which the `bars` are the roads."""
+    own = finder(len(points), len(bars.owner), 2 * len(ends))
+    node, bar = own.frame.node, own.frame.bar
+    node["x"], node["y"] = points.T
+    own.put_bars(bars.start, bars.end)
+    bar["owner"] = bars.owner
+    bar["a"], bar["b"] = ends[bars.owner].T
+    return own
 
 
-def _tips(ends: Ints) -> tuple[Ints, Ints, Ints]:
-    """Return the roads out of intersections, by these: intersection, the one at the other end, segment."""
-    hub = np.concatenate([ends[:, 0], ends[:, 1]])
-    tip = np.concatenate([ends[:, 1], ends[:, 0]])
-    order = np.argsort(hub, kind="stable")
-    return hub[order], tip[order], order % max(len(ends), 1)
+def _told(found: Ints) -> Tight:
+    """Return what kernels have found (`roads.closeness.Hit`), in order."""
+    vertices, segments = (found[:, :2] >= 0).sum(axis=1), (found[:, 2:] >= 0).sum(axis=1)
+    short, close = found[vertices == 0, 2], found[vertices == 2, :2]
+    beside, sharp = found[(vertices == 1) & (segments == 1)], found[(vertices == 1) & (segments == 2)]
+    return Tight(short, _distinct(close), _distinct(beside[:, [0, 2]]), sharp[:, [0, 2, 3]])
 
 
-def _sharp(hub: Ints, step: Floats, segment: Ints, cosine: float) -> Ints:
-    """Return intersections and pairs of segments that make an angle there whose cosine is not below `cosine`.
-
-    `hub` (K,), ascending, are the intersections out of which roads lead in the direction `step` (K, 2).
-
-    Norm: docs/rules.md#arms.
-    """
-    step = step / _norm(step)[:, None]
-    found: list[Ints] = []
-    for gap in (1, 2, 3):
-        same = np.flatnonzero(hub[:-gap] == hub[gap:]) if len(hub) > gap else np.empty(0, dtype=np.int64)
-        other = same + gap
-        acute = (step[same] * step[other]).sum(axis=1) > cosine - ROUNDING
-        found.append(np.stack([hub[same], segment[same], segment[other]], axis=-1)[acute])
-    return np.concatenate(found)
+def _distinct(rows: Ints) -> Ints:
+    return np.unique(rows, axis=0) if len(rows) else rows
 
 
 def clearance_faults(
@@ -164,19 +137,8 @@ def clearance_faults(
     return faults
 
 
-def distances(p: Floats, a: Floats, b: Floats) -> Floats:
-    """Return the distances from points p to segments from a to b, each (..., 2)."""
-    step, away = b - a, p - a
-    along = (away * step).sum(axis=-1) / (step * step).sum(axis=-1)
-    return _norm(away - np.clip(along, 0.0, 1.0)[..., None] * step)
-
-
 def _norm(vectors: Floats) -> Floats:
     return np.sqrt((vectors * vectors).sum(axis=-1))
-
-
-def _distinct(rows: list[Ints]) -> Ints:
-    return np.unique(np.concatenate(rows), axis=0) if rows else np.empty((0, 2), dtype=np.int64)
 
 
 def _couples(rows: Ints) -> list[tuple[int, int]]:
