@@ -24,8 +24,8 @@ from benchmarks.table import Row, show
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, queue, submissions
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.database_tables import Account, Competition, Phase
 from dubins_traffic.service.submissions import Upload
-from dubins_traffic.service.tables import Account, Competition, Phase
 
 READERS = 50
 SECONDS = 20.0

@@ -12,10 +12,10 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database_tables import Account, Chunk, Phase, Submission, Trial
 from dubins_traffic.service.hiding import NOTHING
 from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import RefusedError, Upload
-from dubins_traffic.service.tables import Account, Chunk, Phase, Submission, Trial
 from tests.services import competition_text
 
 NOW = 2_000_000_000.0

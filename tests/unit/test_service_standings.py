@@ -10,8 +10,16 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.service import accounts, housekeeping, standings, viewing
+from dubins_traffic.service.database_tables import (
+    Account,
+    Chunk,
+    Competition,
+    Phase,
+    Standing,
+    Submission,
+    Trial,
+)
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Account, Chunk, Competition, Phase, Standing, Submission, Trial
 
 NOW = 5000.0
 

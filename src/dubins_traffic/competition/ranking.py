@@ -28,7 +28,7 @@ PLATFORM: Final = frozenset(end for end, owner in OWNERS.items() if owner == "pl
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
+class RankedEntry:
     """The place of one entry."""
 
     place: int
@@ -85,7 +85,7 @@ class _Entry:
     cut: int
 
 
-def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
+def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[RankedEntry]:
     """Rank entries by what they did in the same trials.
 
     Parameters
@@ -95,7 +95,7 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
 
     Returns
     -------
-    list of Place
+    list of RankedEntry
         Best first; entries on one place in the order of their names.
 
     Raises
@@ -109,7 +109,7 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
         reverse=True,
     )
     apart = {(one.first, one.second): one for one in _differences(ranked, phase)}
-    places: list[Place] = []
+    places: list[RankedEntry] = []
     for k, entry in enumerate(ranked):
         equal = k > 0 and _merit(entry, phase) == _merit(ranked[k - 1], phase)
         beside = [
@@ -120,7 +120,7 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
         following = apart[entry.name, ranked[k + 1].name].estimate if k + 1 < len(ranked) else None
         count = len(entry.values)
         places.append(
-            Place(
+            RankedEntry(
                 places[-1].place if equal else k + 1,
                 entry.name,
                 count,

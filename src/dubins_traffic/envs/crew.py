@@ -97,7 +97,7 @@ Bools = npt.NDArray[np.bool_]
 
 
 @dataclass
-class Cast:
+class Roles:
     """Which cars learners drive in the trials of a crew."""
 
     learned: Sequence[int]
@@ -110,7 +110,7 @@ class Cast:
     """Whether what one side breaks after the other costs nothing (`Blame`)."""
 
 
-class Crew:
+class MultiAgentTrials:
     """Some trials of one configuration, from their first frames on.
 
     Parameters
@@ -132,12 +132,12 @@ class Crew:
         Of each trial, whose breaches count.
     """
 
-    def __init__(self, instances: Sequence[Instance], cast: Cast, settings: Settings) -> None:
-        with_roles = [with_learners(instance, cast.learned) for instance in instances]
-        if cast.ego is None:
+    def __init__(self, instances: Sequence[Instance], roles: Roles, settings: Settings) -> None:
+        with_roles = [with_learners(instance, roles.learned) for instance in instances]
+        if roles.ego is None:
             self.group = Group(with_roles, keeps_rules=False)
         else:
-            egos = Egos(cast.ego, apart=True)
+            egos = Egos(roles.ego, apart=True)
             is_kernel = egos.is_compiled and not settings.disturbed
             self.group = egos.group(with_roles, Way.COMPILED if is_kernel else Way.ASKED)
         self._cars = len(instances[0].starts)
@@ -156,21 +156,21 @@ class Crew:
         self.broken: Ints = np.zeros((trials, places, len(PARTS)), dtype=np.int64)
         self.stepped_in: Ints = np.zeros((trials, places), dtype=np.int64)
         self.given: list[Floats] = []
-        self.blame = [Blame(problem, excuses=cast.excuses) for problem in problems]
+        self.blame = [Blame(problem, excuses=roles.excuses) for problem in problems]
         self._known = [(0, 0)] * trials
-        self._learned = list(cast.learned)
-        self._shields = self._shielded(problems, cast)
+        self._learned = list(roles.learned)
+        self._shields = self._shielded(problems, roles)
         self._count, self._tell = bound(count_cars), bound(tell_cars)
         begin_trials(self.outlook, self._steps)
         self._charge(np.arange(trials, dtype=np.int64))
         self.broken[:] = 0
         self._observe(np.arange(trials, dtype=np.int64))
 
-    def _shielded(self, problems: Any, cast: Cast) -> list[CarShields]:
+    def _shielded(self, problems: Any, roles: Roles) -> list[CarShields]:
         shields_of_cars: list[CarShields] = []
-        for overtakes in dict.fromkeys(cast.shields.values()):
+        for overtakes in dict.fromkeys(roles.shields.values()):
             cars: Bools = np.zeros(self.group.state.x.shape, dtype=np.bool_)
-            cars[:, [car for car, shield in cast.shields.items() if shield == overtakes]] = True
+            cars[:, [car for car, shield in roles.shields.items() if shield == overtakes]] = True
             shields_of_cars.append(CarShields(problems, self._views, cars, overtakes=overtakes))
         return shields_of_cars
 

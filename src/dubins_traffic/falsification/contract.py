@@ -44,7 +44,7 @@ CAPRICIOUS: Final = ("rolls", "left", "blocks", "tailgates", "parks")
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
+class ContractMargins:
     """What came of the contract in a trial."""
 
     margins: dict[str, float] = field(default_factory=dict[str, float])
@@ -69,9 +69,9 @@ def keeps_law(agent: EAgent) -> bool:
     )  # fmt: skip
 
 
-def kept(verdict: Verdict, passages: Passages, trial: int, instance: Instance) -> Kept:
+def contract_margins(verdict: Verdict, passages: Passages, trial: int, instance: Instance) -> ContractMargins:
     """Return what came of the contract in number `trial` of `passages`, the trial of an instance, by its verdict."""
-    contract = Kept()
+    contract = ContractMargins()
     provoked = provocation(verdict, instance)
     if provoked is not None or any(keeps_law(agent) for agent in instance.e_agents):
         contract.margins[PROVOKED] = 1.0 if provoked is None else -1.0

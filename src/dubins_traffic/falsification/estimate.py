@@ -25,7 +25,7 @@ from dubins_traffic.falsification.contract import TARGETS
 from dubins_traffic.falsification.coverage import Counts
 from dubins_traffic.falsification.sampling import STREAM, prepared
 from dubins_traffic.falsification.splitting import Begin, Split, beginner, split
-from dubins_traffic.falsification.trying import Crew, crew_of, in_order
+from dubins_traffic.falsification.trying import Runner, in_order, runner_of
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many
 
@@ -250,12 +250,12 @@ def estimate(
         begin = beginner(controller, event)
         return by_splitting(drawn(config, seed), begin, event, below, particles, runs, seed, notify)
     count = trials or 10_000
-    with crew_of(controller, name, workers, None) as crew:
+    with runner_of(controller, name, workers, None) as crew:
         return by_counting(draw_many(config, seed, range(count)), crew, event, below, notify)
 
 
 def by_counting(
-    instances: Iterable[Instance], crew: Crew, event: str, below: float, progress: Progress
+    instances: Iterable[Instance], crew: Runner, event: str, below: float, progress: Progress
 ) -> Probability:
     """Return what Monte Carlo gives on some trials; the parameters are those of `estimate`."""
     counts = Counts()

@@ -75,7 +75,7 @@ ON_LANE: Final = 1e-6
 """Metres that a start may lie beside the middle of its lane."""
 
 
-class Place(NamedTuple):
+class StartLane(NamedTuple):
     """Where cars may start: start (x, y) and direction (c, s) of a lane's middle, from which to which metre, and its
     number.
     """
@@ -89,14 +89,14 @@ class Place(NamedTuple):
     lane: int
 
 
-class Lots(NamedTuple):
+class LaneStarts(NamedTuple):
     """All places where cars may start, lane by lane.
 
     `first` and `last` are the numbers of the first and the last place of each lane that has any; `ends` the
     intersections at its beginning and end; `near` the places that are near to each square of side `SQUARE`.
     """
 
-    places: list[Place]
+    places: list[StartLane]
     near: dict[tuple[int, int], list[int]]
     first: dict[int, int]
     last: dict[int, int]
@@ -134,7 +134,7 @@ def span_of(base: Instance, pose: Pose) -> tuple[float, float] | None:
     return min(lot.low - along, 0.0), max(lot.high - along, 0.0)
 
 
-def spot_of(lots: Lots, pose: Pose) -> tuple[int, float] | None:
+def spot_of(lots: LaneStarts, pose: Pose) -> tuple[int, float] | None:
     """Return in which of the places where cars may start a start is, and after how many metres of its lane."""
     places = lots.places
     for k in lots.near.get(_square(pose.x, pose.y), ()):
@@ -147,14 +147,14 @@ def spot_of(lots: Lots, pose: Pose) -> tuple[int, float] | None:
     return None
 
 
-def pose_at(lots: Lots, place: int, along: float) -> Pose:
+def pose_at(lots: LaneStarts, place: int, along: float) -> Pose:
     """Return the pose in a place where cars may start that is nearest to some metres of its lane."""
     x, y, c, s, low, high, _ = lots.places[place]
     far = min(max(along, low), high)
     return Pose(x + far * c, y + far * s, c, s)
 
 
-def lots_of(base: Instance) -> Lots:
+def lots_of(base: Instance) -> LaneStarts:
     """Return where cars may start on the roads of an instance; kept with the network."""
     problem = base.problem
     key = _FREE, problem.car, problem.intersection_radius, problem.obstacles
@@ -164,7 +164,7 @@ def lots_of(base: Instance) -> Lots:
         lines, free = areas_of(ground).outside.tables()
         columns = np.column_stack((lines[free.lane], free.low, free.high)).tolist()
         places = [
-            Place(x, y, c, s, low, high, lane)
+            StartLane(x, y, c, s, low, high, lane)
             for (x, y, c, s, low, high), lane in zip(columns, free.lane.tolist(), strict=True)
         ]
         first: dict[int, int] = {}
@@ -173,7 +173,7 @@ def lots_of(base: Instance) -> Lots:
             first.setdefault(lot.lane, k)
             last[lot.lane] = k
         ends = {lane: problem.network.lane_ends(lane) for lane in first}
-        lots = problem.network.known[key] = Lots(places, _near(places), first, last, ends)
+        lots = problem.network.known[key] = LaneStarts(places, _near(places), first, last, ends)
     return lots  # pyright: ignore[reportReturnType]  # what stands under our own key
 
 
@@ -181,7 +181,7 @@ def _square(x: float, y: float) -> tuple[int, int]:
     return floor(x / SQUARE), floor(y / SQUARE)
 
 
-def _near(places: list[Place]) -> dict[tuple[int, int], list[int]]:
+def _near(places: list[StartLane]) -> dict[tuple[int, int], list[int]]:
     """Return the numbers of the places, ascending, that have a part in or beside each square."""
     near: dict[tuple[int, int], list[int]] = {}
     for k, (x, y, c, s, low, high, _) in enumerate(places):
@@ -242,7 +242,7 @@ def _is_free(base: Instance, car: int) -> bool:
 
 
 def _place(
-    genome: Genome, base: Instance, lots: Lots, kind: float, near: float, dice: np.random.Generator
+    genome: Genome, base: Instance, lots: LaneStarts, kind: float, near: float, dice: np.random.Generator
 ) -> tuple[int, float] | None:
     """Return the place where cars may start in which one meets the ego, and metres of its lane; None for none."""
     spot = spot_of(lots, genome.starts.get(EGO, base.starts[EGO]))

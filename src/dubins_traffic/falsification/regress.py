@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class CaseOutcome:
     """What a controller did in a case."""
 
     file: Path
@@ -59,7 +59,7 @@ class Outcome:
         }
 
 
-def regress(folder: str | os.PathLike[str], controller: str | Maker | Remote) -> list[Outcome]:
+def regress(folder: str | os.PathLike[str], controller: str | Maker | Remote) -> list[CaseOutcome]:
     """Run every case of a folder with a controller.
 
     Parameters
@@ -88,7 +88,7 @@ def cases_in(folder: str | os.PathLike[str]) -> list[tuple[Path, Case]]:
     return cases
 
 
-def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remote) -> Iterator[Outcome]:
+def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remote) -> Iterator[CaseOutcome]:
     """Run cases with a controller, and yield what it did in each."""
     name, make = name_of(controller), driver_of(controller)
     if not isinstance(make, Remote):
@@ -106,7 +106,9 @@ def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remot
         outcome = verdict.verdict.value if fault is None else fault.end.value
         of_it = [broken for broken in breaches if broken.rule == case.story.rule] or breaches
         sentence = sentence_of(judged.record, judged.score, of_it[0]) if breaches else ""
-        yield Outcome(path, case, outcome, _rules(breaches), sentence, "" if fault is None else str(fault))
+        yield CaseOutcome(
+            path, case, outcome, _rules(breaches), sentence, "" if fault is None else str(fault)
+        )
 
 
 def _rules(breaches: Sequence[Violation]) -> tuple[str, ...]:

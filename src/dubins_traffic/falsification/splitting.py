@@ -267,7 +267,7 @@ HASTE: Final = 0.05
 """Metres by which a gap counts as wider for each second until then."""
 
 
-class Watched:
+class MeasuredGroup:
     """A group of trials and the least margin of one rule that each has had.
 
     Parameters
@@ -305,9 +305,9 @@ class Watched:
             if ending is not None and ending.end in FAULTS:
                 raise ControllerError(ending.end.value, f"{instance.title} ended by a fault ({ending})")
 
-    def fork(self, trials: Sequence[int]) -> Watched:
+    def fork(self, trials: Sequence[int]) -> MeasuredGroup:
         """Return independent copies of some trials, each with a copy of its controller."""
-        return Watched(self.group.fork(trials), self.rule)
+        return MeasuredGroup(self.group.fork(trials), self.rule)
 
     def reseed(self, seeds: Sequence[int]) -> None:
         """Let each trial go on from another seed."""
@@ -343,7 +343,7 @@ def beginner(controller: str | Maker, rule: str) -> Begin:
         raise InputError("has no margin that can be watched", file="--event", value=rule, expected=expected)
     egos = Egos(controller, apart=True)
 
-    def begin(instances: Sequence[Instance]) -> Watched:
+    def begin(instances: Sequence[Instance]) -> MeasuredGroup:
         ways = egos.ways(instances)
         if not all(map(can_share, instances)) or len(grouped(instances)) != 1:
             raise InputError(
@@ -351,6 +351,6 @@ def beginner(controller: str | Maker, rule: str) -> Begin:
                 expected="the embedded simulator, no formulas, no cars of one's own or elsewhere, one control rate",
             )  # fmt: skip
         way = Way.COMPILED if len(ways[Way.COMPILED]) == len(instances) else Way.ASKED
-        return Watched(egos.group(instances, way), rule)
+        return MeasuredGroup(egos.group(instances, way), rule)
 
     return begin

@@ -17,15 +17,14 @@ from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.engine.egos import Egos, Way, grouped
 from dubins_traffic.errors import InputError, WorkerLostError
-from dubins_traffic.falsification.contract import Kept, kept, spare
+from dubins_traffic.falsification.contract import ContractMargins, contract_margins, spare
 from dubins_traffic.falsification.coverage import Cell, Manoeuvre
 from dubins_traffic.falsification.passages import Passages, find_passages
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.record.reader import Record, replay
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.runs.crew import Cancelled, carry_out
-from dubins_traffic.runs.crew import Crew as Workers
+from dubins_traffic.runs.crew import Cancelled, Crew, carry_out
 from dubins_traffic.scoring.margins import LIVENESS
 from dubins_traffic.scoring.score import Score, score
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Ruling
@@ -254,7 +253,7 @@ def tried_of(
         first |= {rule: round(time * rate) for rule, time in broken_formulas(score).items()}
         first |= {LIVENESS: ending.ticks} if ending is not None and late is not None and late < 0.0 else {}
     discarded = verdict.verdict is Ruling.EXCUSED or (not breaches and assumption_broken)
-    contract = Kept() if fault else kept(verdict, passages, trial, instance)
+    contract = ContractMargins() if fault else contract_margins(verdict, passages, trial, instance)
     margins |= contract.margins
     first = contract.frames if discarded else first | contract.frames
     ordered = sorted(first.items(), key=lambda item: (item[1], item[0]))
@@ -297,7 +296,7 @@ MOST_IN_CHUNK: Final = 32
 """Most trials that a worker is handed at a time."""
 
 
-class Crew(Protocol):
+class Runner(Protocol):
     """Runs the trials of a search."""
 
     make: Maker | Remote
@@ -350,7 +349,7 @@ _runners: dict[str, TrialRunner] = {}
 class PoolRunner:
     """Hands chunks of trials to workers."""
 
-    def __init__(self, controller: str, workers: Workers) -> None:
+    def __init__(self, controller: str, workers: Crew) -> None:
         controllers.load(controller)
         self.make: Maker | Remote = maker(controller)
         self.name = controller
@@ -398,7 +397,9 @@ def name_of(controller: str | Maker | Remote) -> str:
 
 
 @contextlib.contextmanager
-def crew_of(controller: str | Maker | Remote, name: str, workers: int, ray: str | None) -> Generator[Crew]:
+def runner_of(
+    controller: str | Maker | Remote, name: str, workers: int, ray: str | None
+) -> Generator[Runner]:
     """Yield who runs the trials of a search with a controller: `workers` processes, or a Ray cluster at an address."""
     if workers == 1 and ray is None:
         yield LocalRunner(controller, name)

@@ -15,7 +15,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.service.tables import Account, Act, Code, Team, Token
+from dubins_traffic.service.database_tables import Account, Act, Code, Team, Token
 
 ORGANISER, PARTICIPANT = "organiser", "participant"
 ROLES = (PARTICIPANT, ORGANISER)

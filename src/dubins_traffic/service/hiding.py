@@ -16,7 +16,7 @@ from cryptography.exceptions import InvalidTag
 
 from dubins_traffic.competition.sealing import cipher_of
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.service.tables import Chunk, Standing, Trial
+from dubins_traffic.service.database_tables import Chunk, Standing, Trial
 
 NONCE: Final = 12
 HIDDEN: Final = {Trial: ("row", "end", "owner", "frames", "ran", "again"), Standing: ("places",)}

@@ -12,9 +12,9 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
 from dubins_traffic.service import organising, queue, standings, submissions
+from dubins_traffic.service.database_tables import Phase, Submission
 from dubins_traffic.service.hiding import Hiding
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Phase, Submission
 
 PAUSE_S = 1.0
 PODIUM = 3

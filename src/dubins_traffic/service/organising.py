@@ -22,8 +22,8 @@ from dubins_traffic.competition.competition import Competition as Loaded
 from dubins_traffic.errors import DubinsTrafficError, InputError, shown
 from dubins_traffic.service import receiving, standings, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError, note
+from dubins_traffic.service.database_tables import Account, Competition, Phase, Submission
 from dubins_traffic.service.service import Service, competition_of
-from dubins_traffic.service.tables import Account, Competition, Phase, Submission
 
 SLUG = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,58}[a-z0-9])?")
 PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")

@@ -12,7 +12,7 @@ from sqlalchemy import func, or_, select, update
 from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.service.tables import Chunk, Submission, Team
+from dubins_traffic.service.database_tables import Chunk, Submission, Team
 
 ATTEMPTS = 5
 """So many leases of a chunk may end without a result; then its submission fails, by our fault."""

@@ -10,9 +10,9 @@ from sqlalchemy.orm import Session
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service import submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database_tables import Account, Phase, Submission
 from dubins_traffic.service.service import Service, phase_of
 from dubins_traffic.service.submissions import RefusedError, Upload
-from dubins_traffic.service.tables import Account, Phase, Submission
 
 
 class UnknownError(DubinsTrafficError):

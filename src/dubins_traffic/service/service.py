@@ -24,15 +24,15 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.files import exists, read_text
 from dubins_traffic.problem.faults import Strict, parse
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.database_tables import Competition, Phase
 from dubins_traffic.service.hiding import NOTHING, Hiding, hiding_of
 from dubins_traffic.service.storage import Storage
-from dubins_traffic.service.tables import Competition, Phase
 
 FILE = "service.toml"
 Positive = Annotated[float, Field(gt=0)]
 
 
-class Settings(Strict):
+class ServiceSettings(Strict):
     """What may be set, and what it is unless set."""
 
     name: str = Field(
@@ -64,19 +64,19 @@ class Settings(Strict):
         return self.url.startswith("https://")
 
 
-def load_settings(folder: Path) -> Settings:
+def load_settings(folder: Path) -> ServiceSettings:
     """Return the settings in the folder of a service, those that are not set at their defaults.
 
     InputError if the file can't be read or something in it is wrong.
     """
     path = folder / FILE
     if not exists(path):
-        return Settings()
+        return ServiceSettings()
     try:
         document = tomllib.loads(read_text(path))
     except (ValueError, RecursionError) as error:
         raise InputError(f"not TOML ({error})", file=str(path)) from None
-    return parse(Settings, document, file=str(path))
+    return parse(ServiceSettings, document, file=str(path))
 
 
 def secret_in(folder: Path, name: str) -> str:
@@ -115,7 +115,7 @@ class Service:
     def __init__(self, folder: Path, key_file: Path | None = None, clock: Clock = time.time) -> None:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.folder = folder
-        self.settings: Settings = load_settings(folder)
+        self.settings: ServiceSettings = load_settings(folder)
         self.clock = clock
         self.database = Database(self.settings.database or f"sqlite:///{folder / 'service.db'}")
         self.storage = Storage(self.settings.storage or str(folder / "store"))

@@ -13,9 +13,9 @@ from dubins_traffic.competition.competition import Phase as Loaded
 from dubins_traffic.competition.judging import Judged
 from dubins_traffic.competition.ranking import missing, rank
 from dubins_traffic.service import submissions
+from dubins_traffic.service.database_tables import Phase, Standing, Submission, Team, Trial
 from dubins_traffic.service.hiding import HiddenError, Hiding
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Phase, Standing, Submission, Team, Trial
 
 log = structlog.get_logger("dubins_traffic.service")
 

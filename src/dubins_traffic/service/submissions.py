@@ -14,8 +14,8 @@ from sqlalchemy.orm import Session, defer, undefer
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.errors import DubinsTrafficError, shown
 from dubins_traffic.service import queue
+from dubins_traffic.service.database_tables import Account, Chunk, Phase, Submission, Trial
 from dubins_traffic.service.hiding import Hiding
-from dubins_traffic.service.tables import Account, Chunk, Phase, Submission, Trial
 
 HOUR = 3600.0
 DEADLINES = {"received": HOUR, "checking": HOUR, "queued": 168 * HOUR, "running": 48 * HOUR, "scoring": HOUR}

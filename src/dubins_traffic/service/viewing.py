@@ -11,8 +11,16 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.visibility import SubmissionState, visible
 from dubins_traffic.service import queue, standings, submissions
+from dubins_traffic.service.database_tables import (
+    Account,
+    Chunk,
+    Competition,
+    Phase,
+    Submission,
+    Trial,
+    Worker,
+)
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Account, Chunk, Competition, Phase, Submission, Trial, Worker
 
 ALIVE_S = 120.0
 """A worker that was heard of within so many seconds is there."""

@@ -179,7 +179,7 @@ SHORT = 0.5
 TOPIC = "the other maestro's problem instance"
 
 
-class _Kept:
+class _KeptFrames:
     """A sink that keeps the frames of a trial until its duration is known: when the maestro ends it."""
 
     def __init__(self) -> None:
@@ -223,7 +223,7 @@ def run_under(session: Session, maestro: ForeignMaestro, shortest: float) -> Ite
         drawn = hand_over(session.supply(done), session.remote)
         instance = _await_problem(session, maestro, drawn, session.which(drawn, done))
         session.say(f"{session.which(instance, done)}: begins")
-        kept = _Kept()
+        kept = _KeptFrames()
         result = run_trial(instance, session.controller, sinks=[kept], link=link, simulator=session.simulator)
         yield _settled(result, kept, shortest, record_path(session.records, done, 0))
         check_lost(link)
@@ -278,7 +278,7 @@ def with_problem(instance: Instance, text: str) -> Instance:
     )
 
 
-def _settled(result: Result, kept: _Kept, shortest: float, path: Path | None) -> Result:
+def _settled(result: Result, kept: _KeptFrames, shortest: float, path: Path | None) -> Result:
     """Return the result of a trial, with the duration that is now known, and write its record."""
     ending = result.ending
     seconds = max(1, ending.ticks) / result.instance.problem.rate

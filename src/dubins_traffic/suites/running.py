@@ -37,10 +37,10 @@ from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.scoring.registry import STRATEGY_SHARE
 from dubins_traffic.suites.results import KEPT, GameResult, played, save, save_trials
 from dubins_traffic.suites.suite import CaseEntry, GameEntry, Suite
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build, save_game
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.solver import solve
 
 CASES_FILE: Final = "cases.jsonl"
@@ -268,7 +268,7 @@ def board_of(entry: GameEntry) -> Board:
     network = RoadNetwork.from_document(entry.rnd)
     goals = [network.vertex((x, y)) for x, y in entry.goals]
     words = [word for word in entry.assume.split(",") if word]
-    return Board(Arena.of(network, goals, entry.order_degree), Assumption.parse(words), entry.cars)
+    return Board(RoadCells.of(network, goals, entry.order_degree), Assumption.parse(words), entry.cars)
 
 
 def agrees(entry: GameEntry, result: GameResult) -> bool | None:

@@ -17,7 +17,7 @@ from dubins_traffic.synthesis.assumption import WORDS, Assumption, part_of
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy, story_of
 from dubins_traffic.synthesis.game import Progress, build
-from dubins_traffic.synthesis.instance import arena_of, assumption_of, start_positions
+from dubins_traffic.synthesis.instance import assumption_of, cells_of, start_positions
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Ranks, Solution, solve
 
@@ -80,10 +80,10 @@ def smallest(
     """
 
     def wins(assumption: Assumption) -> bool:
-        game = build(Board(board.arena, assumption, board.others), limit=limit, progress=progress)
+        game = build(Board(board.road_cells, assumption, board.others), limit=limit, progress=progress)
         return wanted(solve(game, progress=progress))
 
-    bends = not all(node.crossing for node in board.arena.nodes)
+    bends = not all(node.crossing for node in board.road_cells.nodes)
     parts = len({part_of(word) for word in WORDS})
     for count in range(1, parts + 1):
         ladders = strengthenings(board.assumption, count, bends=bends)
@@ -160,8 +160,8 @@ class Answer:
             "nowhere": "nowhere",
         }[self.outcome]
         lines_of_text = [
-            f"{_e_agents(board.others)}, {board.arena.cells} cells, crossings from degree "
-            f"{board.arena.order_degree} on; assumed: {board.assumption}",
+            f"{_e_agents(board.others)}, {board.road_cells.cells} cells, crossings from degree "
+            f"{board.road_cells.order_degree} on; assumed: {board.assumption}",
             f"{game.positions:,} positions, {game.moves:,} moves of the environment",
             f"The ego wins {where}.",
         ]
@@ -209,18 +209,18 @@ class Answer:
 
     def _waits(self, target: int, ranks: Ranks) -> str:
         """Return in how many positions on the way to a target the ego gets on by itself or waits, and for what."""
-        arena = self.solution.game.board.arena
+        road_cells = self.solution.game.board.road_cells
         held = ranks.rank > 0
         debt = ranks.debt[ranks.rank[held]]
-        nodes = len(arena.nodes)
+        nodes = len(road_cells.nodes)
         parts = {
             "gets nearer whatever the others do": debt < 0,
-            "waits until one enters (E3, E5)": (debt >= nodes) & (debt < arena.cells),
+            "waits until one enters (E3, E5)": (debt >= nodes) & (debt < road_cells.cells),
             "waits until one leaves (E4)": (debt >= 0) & (debt < nodes),
-            "waits until the goal is freed (E6)": debt >= arena.cells,
+            "waits until the goal is freed (E6)": debt >= road_cells.cells,
         }
         shares = ", ".join(f"{what} in {int(some.sum()):,}" for what, some in parts.items() if some.any())
-        return f"On the way to {arena.target_name(target)} it {shares} positions."
+        return f"On the way to {road_cells.target_name(target)} it {shares} positions."
 
 
 def _e_agents(count: int) -> str:
@@ -257,13 +257,13 @@ def answer(
     Raises
     ------
     InputError
-        As `game.build` and `Arena.of`.
+        As `game.build` and `RoadCells.of`.
     """
     begun = perf_counter()
-    arena = arena_of(instance.problem, order_degree)
+    road_cells = cells_of(instance.problem, order_degree)
     others = len(instance.e_agents) if cars is None else cars
-    board = Board(arena, assumption_of(instance.problem) if assumption is None else assumption, others)
-    bound = route_bound(arena, board.assumption)
+    board = Board(road_cells, assumption_of(instance.problem) if assumption is None else assumption, others)
+    bound = route_bound(road_cells, board.assumption)
     try:
         game = build(board, limit=limit, progress=progress)
     except InputError as error:

@@ -115,11 +115,11 @@ class Game:
     @property
     def debts(self) -> int:
         """How many kinds of debts there may be: one a cell and one a goal."""
-        return self.board.arena.cells + len(self.board.arena.goals)
+        return self.board.road_cells.cells + len(self.board.road_cells.goals)
 
     def at_target(self, target: int) -> Flags:
-        """Return where (N,) the ego is at one of `Arena.targets`."""
-        return np.isin(self.ego_cell, np.array(self.board.arena.targets[target], dtype=np.int16))
+        """Return where (N,) the ego is at one of `RoadCells.targets`."""
+        return np.isin(self.ego_cell, np.array(self.board.road_cells.targets[target], dtype=np.int16))
 
     def turns(self) -> Iterator[Turns]:
         """Yield the moves of the environment from all positions, in order, some positions at a time."""
@@ -162,7 +162,7 @@ def estimate(board: Board) -> Estimate:
     count = board.positions
     if count == 0:
         raise InputError(
-            "more cars than cells", value=board.others + 1, expected=f"at most {board.arena.cells}"
+            "more cars than cells", value=board.others + 1, expected=f"at most {board.road_cells.cells}"
         )
     if count >= MOST_POSITIONS:
         raise InputError(
@@ -176,7 +176,7 @@ def estimate(board: Board) -> Estimate:
         used = out.used[0]
         sizes += (used.to, used.ego_to, used.owed)
     moves, ego_moves, debts = (count * sizes / len(picked)).tolist()
-    goals = len(board.arena.targets)
+    goals = len(board.road_cells.targets)
     mask = np.dtype(mask_type(board.others)).itemsize
     building = 2 * (4 * ego_moves + (2 + mask) * debts) + 26 * count
     solving = 8 * ego_moves + (6 + mask) * debts + 26 * count
@@ -279,7 +279,7 @@ def _block(board: Board, first: int, last: int, each: int) -> list[Moves]:
 def room(board: Board, rows: int, each: int) -> Moves:
     """Return room for the moves of `rows` positions, about `each` of the environment from one."""
     margin = 64
-    turns, debts = rows * each + margin, 2 * rows * board.others + margin + len(board.arena.goals)
+    turns, debts = rows * each + margin, 2 * rows * board.others + margin + len(board.road_cells.goals)
     masks = mask_type(board.others)
     return Moves(
         np.empty(turns, dtype=np.int32),
@@ -336,35 +336,35 @@ WHO_NAMES: Final = ("e-agent", "ego", "e-agent that has forfeited")
 
 def scene_numbers(board: Board) -> Numbers:
     """Return the scene (N, V) of each node in each position, numbered as in the header."""
-    numbers = np.empty((board.positions, len(board.arena.nodes)), dtype=np.int32)
-    room = np.empty(len(board.arena.nodes), dtype=np.int64)
+    numbers = np.empty((board.positions, len(board.road_cells.nodes)), dtype=np.int32)
+    room = np.empty(len(board.road_cells.nodes), dtype=np.int64)
     list_scenes(board.tables, room, numbers)
     return numbers
 
 
 def header(board: Board) -> dict[str, Any]:
     """Return what the numbers in the file mean."""
-    arena = board.arena
+    road_cells = board.road_cells
     kinds = list(board.sceneries)
     return {
         "format": FORMAT,
         "version": VERSION,
-        "network": arena.network.to_document(),
-        "goals": [list(arena.network.intersections[goal]) for goal in arena.goals],
-        "order_degree": arena.order_degree,
+        "network": road_cells.network.to_document(),
+        "goals": [list(road_cells.network.intersections[goal]) for goal in road_cells.goals],
+        "order_degree": road_cells.order_degree,
         "cars": board.others,
         "assume": list(board.assumption.words()),
-        "cells": [arena.name(cell) for cell in range(arena.cells)],
+        "cells": [road_cells.name(cell) for cell in range(road_cells.cells)],
         "nodes": [
             {
-                "inbound": [len(arena.nodes) + lane for lane in node.inbound],
-                "exits": [len(arena.nodes) + lane for lane in node.exits],
+                "inbound": [len(road_cells.nodes) + lane for lane in node.inbound],
+                "exits": [len(road_cells.nodes) + lane for lane in node.exits],
                 "kind": kinds.index(board.scenery(n).kind),
             }
-            for n, node in enumerate(arena.nodes)
+            for n, node in enumerate(road_cells.nodes)
         ],
-        "goal_nodes": [list(nodes) for nodes in arena.goal_nodes],
-        "targets": [list(nodes) for nodes in arena.targets],
+        "goal_nodes": [list(nodes) for nodes in road_cells.goal_nodes],
+        "targets": [list(nodes) for nodes in road_cells.targets],
         "kinds": [
             [
                 {

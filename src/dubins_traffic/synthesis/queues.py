@@ -38,7 +38,7 @@ IMPOSSIBLE: Final = -1
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
+class NodeKind:
     """Nodes whose scenes are the same."""
 
     slots: int
@@ -55,7 +55,7 @@ class Kind:
     """Whether an e-agent that may enter owes it (E3 at crossings, E5 elsewhere, if the way out allows)."""
 
     @classmethod
-    def of(cls, slots: int, crossing: bool, assumed: Assumption) -> Kind:
+    def of(cls, slots: int, crossing: bool, assumed: Assumption) -> NodeKind:
         """Return the kind of a node."""
         ordered = crossing and assumed.order is not Order.NONE
         return cls(
@@ -103,7 +103,7 @@ class Scene:
         )
 
 
-def scenes(kind: Kind, others: int) -> list[Scene]:
+def scenes(kind: NodeKind, others: int) -> list[Scene]:
     """Return all scenes of a kind with at most so many e-agents, the empty one first."""
     possible: list[Scene] = []
     whos = (WHO.OTHER, WHO.EGO, WHO.RENEWED) if kind.forfeits is Forfeits.ONCE else (WHO.OTHER, WHO.EGO)
@@ -124,7 +124,7 @@ def scenes(kind: Kind, others: int) -> list[Scene]:
 class Scenery:
     """The scenes of a kind and their changes, by number."""
 
-    kind: Kind
+    kind: NodeKind
     """The kind."""
     scenes: list[Scene]
     """By number."""
@@ -242,6 +242,6 @@ class Scenery:
         return replace(scene, queue=queue if self.kind.ordered else tuple(sorted(queue)))
 
 
-def scenery(kind: Kind, others: int) -> Scenery:
+def scenery(kind: NodeKind, others: int) -> Scenery:
     """Return the scenes of a kind with at most so many e-agents."""
     return Scenery(kind, scenes(kind, others))

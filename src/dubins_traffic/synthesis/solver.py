@@ -13,7 +13,15 @@ from typing import Final
 
 import numpy as np
 
-from dubins_traffic.synthesis.fixpoint import UNRANKED, Graph, Search, assign_owners, forced, reach, reverse
+from dubins_traffic.synthesis.fixpoint import (
+    UNRANKED,
+    GoalSearch,
+    Graph,
+    assign_owners,
+    forced,
+    reach,
+    reverse,
+)
 from dubins_traffic.synthesis.game import WORKERS, Game, Progress, room
 from dubins_traffic.synthesis.positions import Cells, Flags, Numbers, Work
 
@@ -145,7 +153,7 @@ class _Solver:
     def winning(self, *, friendly: bool) -> tuple[Flags, tuple[Ranks, ...], tuple[Loss, ...], bool]:
         """Return the winning positions, the ranks, the losses, and whether being friendly has cost any position."""
         count = self._game.positions
-        goals = range(len(self._game.board.arena.targets))
+        goals = range(len(self._game.board.road_cells.targets))
         won = np.ones(count, dtype=np.bool_)
         ways = [won] * len(goals)
         losses: list[Loss] = []
@@ -166,7 +174,7 @@ class _Solver:
 
     def _targets(self, won: Flags) -> list[Flags]:
         """Return, for each goal, where it has been reached and the ego stays where it has won."""
-        targets = [self._game.at_target(goal) for goal in range(len(self._game.board.arena.targets))]
+        targets = [self._game.at_target(goal) for goal in range(len(self._game.board.road_cells.targets))]
         if won.all():
             return targets
         kept = np.empty(won.shape, dtype=np.bool_)
@@ -186,10 +194,10 @@ class _Solver:
     def _side_by_side(self, targets: list[Flags], friendly: bool, what: str) -> list[_Ranked]:
         """Return the ways to these targets; interrupted by Ctrl-C."""
         game = self._game
-        searches = [Search.of(game.positions, game.owed.shape[0], game.debts) for _ in targets]
+        searches = [GoalSearch.of(game.positions, game.owed.shape[0], game.debts) for _ in targets]
         with ThreadPoolExecutor(self._workers) as pool:
             try:
-                cells = game.board.arena.cells
+                cells = game.board.road_cells.cells
                 running = {
                     pool.submit(reach, for_thread(game, self._graph), target, cells, friendly, search)
                     for target, search in zip(targets, searches, strict=True)
@@ -205,13 +213,13 @@ class _Solver:
                 raise
         return [_ranked(search) for search in searches]
 
-    def _tell(self, searches: list[Search], what: str) -> None:
+    def _tell(self, searches: list[GoalSearch], what: str) -> None:
         if self._progress:
             ranked = sum(int(search.control[0].ranked) for search in searches)
             self._progress(what, ranked / (len(searches) * self._game.positions))
 
 
-def _ranked(search: Search) -> _Ranked:
+def _ranked(search: GoalSearch) -> _Ranked:
     """Return what a search has found; its room may go."""
     used = int(search.control[0].next_rank)
     ranks = Ranks(search.rank, search.start[:used].copy(), search.debt[:used].copy())

@@ -24,13 +24,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.synthesis.archive import Archive, save_arrays
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import MOST_OTHERS, Board
 from dubins_traffic.synthesis.fixpoint import NO_DEBT
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, MOST_POSITIONS, Game, room
 from dubins_traffic.synthesis.moves import Work, list_moves
 from dubins_traffic.synthesis.positions import Flags, Numbers
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.road_play import EGO_CAR, RoadPlay
 from dubins_traffic.synthesis.solver import Ranks, Solution
 
@@ -45,7 +45,7 @@ class Strategy:
     board: Board
     """What the numbers of positions mean."""
     ranks: tuple[Ranks, ...]
-    """One table a goal, in the order of `Arena.goals`."""
+    """One table a goal, in the order of `RoadCells.goals`."""
 
     @classmethod
     def of(cls, solution: Solution) -> Strategy:
@@ -81,13 +81,13 @@ class Strategy:
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the strategy to a file, as `save_arrays` does."""
-        arena = self.board.arena
+        road_cells = self.board.road_cells
         header = {
             "format": FORMAT,
             "version": VERSION,
-            "network": arena.network.to_document(),
-            "goals": [list(arena.network.intersections[goal]) for goal in arena.goals],
-            "order_degree": arena.order_degree,
+            "network": road_cells.network.to_document(),
+            "goals": [list(road_cells.network.intersections[goal]) for goal in road_cells.goals],
+            "order_degree": road_cells.order_degree,
             "cars": self.board.others,
             "assume": list(self.board.assumption.words()),
         }
@@ -138,16 +138,16 @@ def _strategy(archive: Archive) -> Strategy:
     header = _header(archive)
     network = RoadNetwork.from_document(header.network)
     goals = [network.vertex((x, y)) for x, y in header.goals]
-    arena = Arena.of(network, goals, header.order_degree)
-    board = Board(arena, Assumption.parse(header.assume), header.cars)
+    road_cells = RoadCells.of(network, goals, header.order_degree)
+    board = Board(road_cells, Assumption.parse(header.assume), header.cars)
     if not 0 < board.positions < MOST_POSITIONS:
         raise InputError("no game", field="header.cars", value=header.cars, expected="one that has positions")
-    return Strategy(board, tuple(_ranks(archive, board, k) for k in range(len(arena.targets))))
+    return Strategy(board, tuple(_ranks(archive, board, k) for k in range(len(road_cells.targets))))
 
 
 def _ranks(archive: Archive, board: Board, target: int) -> Ranks:
     """Return the tables for one target; InputError if they are none of the game."""
-    count, debts = board.positions, board.arena.cells + len(board.arena.goals)
+    count, debts = board.positions, board.road_cells.cells + len(board.road_cells.goals)
     rank = archive.array(f"rank_{target}", np.int32, count, exactly=True)
     start = archive.array(f"start_{target}", np.int32, count + 1)
     debt = archive.array(f"debt_{target}", np.int16, len(start), exactly=True)
@@ -234,14 +234,14 @@ def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Adv
     play : RoadPlay
         Where the play is.
     goal, following : int
-        The goal that is sought, and the one to seek after it (places in `Arena.goals`).
+        The goal that is sought, and the one to seek after it (places in `RoadCells.goals`).
     """
     board = strategy.board
-    nodes = len(board.arena.nodes)
+    nodes = len(board.road_cells.nodes)
     position, cell = play.position, play.cells[EGO_CAR]
     if position is None or cell < nodes or not strategy.wins(position):
         return None
-    node = board.arena.lane_end[cell - nodes][0]
+    node = board.road_cells.lane_end[cell - nodes][0]
     options = play.moves.of_ego(position)
     if len(options) == 1:
         return Advice(node, True, ())
@@ -250,7 +250,7 @@ def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Adv
     after = strategy.ranks[following if rank[inside] == 0 else goal].rank
     free = [
         lane
-        for lane in board.arena.nodes[node].exits
+        for lane in board.road_cells.nodes[node].exits
         if nodes + lane not in play.cells or nodes + lane == cell
     ]
     ways = zip(free, play.moves.of_ego(inside)[1:], strict=True)
@@ -317,5 +317,5 @@ def _worst(game: Game, best: Numbers) -> Numbers:
 
 def _error(game: Game, goal: int, wrong: Flags, fault: str) -> StrategyError:
     position = int(np.flatnonzero(wrong)[0])
-    name = game.board.arena.target_name(goal)
+    name = game.board.road_cells.target_name(goal)
     return StrategyError(f"position {position}, on the way to {name}: {fault} ({int(wrong.sum())} such)")

@@ -87,7 +87,7 @@ class Link:
         self._remote = [agent.name for agent in instance.e_agents if agent.kind == REMOTE]
         if self.ego:
             self._remote.insert(0, EGO_NAME)
-        self._sights = Sights(instance)
+        self._sights = CarViews(instance)
         self._running = False
         self._moving = False
         self._announced = 0.0
@@ -438,7 +438,7 @@ def onward(before: State, seconds: float) -> State:
     return State(x, y, c, s, before.speed, before.yaw_rate, before.count)
 
 
-class Sights:
+class CarViews:
     """What each car of one trial sees."""
 
     def __init__(self, instance: Instance) -> None:

@@ -13,9 +13,9 @@ from prometheus_client import CollectorRegistry, Gauge, generate_latest
 from sqlalchemy import func, select
 
 from dubins_traffic.service import receiving, standings, viewing
+from dubins_traffic.service.database_tables import Competition, Submission
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service, competition_of
-from dubins_traffic.service.tables import Competition, Submission
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
 

@@ -13,9 +13,9 @@ from sqlalchemy import select
 
 from dubins_traffic.service import accounts, organising, receiving, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database_tables import Account, Act, Competition, Submission, Team
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Account, Act, Competition, Submission, Team
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.pages import Form, page
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere

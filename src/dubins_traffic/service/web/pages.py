@@ -19,11 +19,19 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition import sealing
 from dubins_traffic.service import accounts, receiving, standings, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database_tables import (
+    Account,
+    Competition,
+    Standing,
+    Submission,
+    Team,
+    Token,
+    Trial,
+)
 from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service, competition_of
 from dubins_traffic.service.submissions import RefusedError
-from dubins_traffic.service.tables import Account, Competition, Standing, Submission, Team, Token, Trial
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
 

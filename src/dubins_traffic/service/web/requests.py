@@ -16,8 +16,8 @@ from litestar.types import ASGIApp, HTTPReceiveMessage, Receive, Scope, Send
 from litestar.types.asgi_types import WebSocketReceiveMessage
 
 from dubins_traffic.service import accounts
+from dubins_traffic.service.database_tables import Account, Team
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Account, Team
 
 ServiceHere = NamedDependency[Service]
 """The service, as handlers are given it."""

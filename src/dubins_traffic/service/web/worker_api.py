@@ -16,9 +16,9 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.judging import Owner
 from dubins_traffic.service import housekeeping, queue, submissions
+from dubins_traffic.service.database_tables import Chunk, Submission, Worker
 from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Chunk, Submission, Worker
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.requests import ServiceHere
 

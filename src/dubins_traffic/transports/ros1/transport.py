@@ -22,7 +22,7 @@ from dubins_traffic.transports.maestro import ForeignMaestro, Maestro, Mode
 from dubins_traffic.transports.ros import Stamps, placed
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join, tell_first
-from dubins_traffic.transports.ros1.world import Topics, World
+from dubins_traffic.transports.ros1.world import Ros1Publishers, Topics
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -221,7 +221,7 @@ class Ros1:
         )
         self._stamps = Stamps(self.interval, clock=clock)
         self._simulated_here, self._foreign = simulated, foreign
-        self._world: World | None = None
+        self._world: Ros1Publishers | None = None
         self._subscribers: dict[str, Any] = {}
         self._there: dict[str, int] = {}
         self._spoke: set[str] = set()
@@ -255,7 +255,9 @@ class Ros1:
         """Put up the topics of the instance's cars, and listen to those that are remote."""
         with self._guarded():
             self._topics.retain(instance.names)
-            self._world = World(self._topics, instance, clock=self._clock, simulated=self._simulated_here)
+            self._world = Ros1Publishers(
+                self._topics, instance, clock=self._clock, simulated=self._simulated_here
+            )
             self._services.describe(instance)
             self._listen(remote)
         self._stamps.begin()

@@ -68,7 +68,7 @@ class Topics:
             self._made.popitem()[1].unregister()
 
 
-class World:
+class Ros1Publishers:
     """Publishes the cars of one instance; only what someone listens to is made.
 
     Parameters

@@ -34,7 +34,7 @@ class Node:
 
 
 @dataclass(frozen=True)
-class Arena:
+class RoadCells:
     """The cells of a network: its nodes 0 to V-1, then its lanes V to V+L-1."""
 
     network: RoadNetwork
@@ -47,7 +47,7 @@ class Arena:
     """In the order of their intersections."""
 
     @classmethod
-    def of(cls, network: RoadNetwork, goals: Sequence[int], order_degree: int = 1) -> Arena:
+    def of(cls, network: RoadNetwork, goals: Sequence[int], order_degree: int = 1) -> RoadCells:
         """Return the cells of a network.
 
         Parameters
