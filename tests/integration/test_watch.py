@@ -267,7 +267,7 @@ def test_one_plays_the_others_look_on_and_who_gives_up_is_told_his_place(tmp_pat
             first.send('{"give_up": true}')
             for connection in (first, second):
                 ticks, messages = heard(connection)
-                assert ticks
+                assert ticks or connection is first  # of which some ticks have been read above
                 assert messages[-1]["sentence"].startswith("You came ")
                 assert [row["you"] for row in messages[-1]["rows"]].count(True) == 1
         status, out, told = program.end()

@@ -30,7 +30,9 @@ class Panel {
     this.rows = trial.cars.map((car, index) => this.addCar(car, () => choose(index)));
     for (const [keys, effect] of KEYS) find("keys").append(make("dt", keys), make("dd", effect));
     find("excuse").addEventListener("click", () => this.go(this.trial.marks[this.trial.verdict.excuse]));
-    this.filters = Object.entries(GROUPS).map(([group, name]) => this.addFilter(group, name, filter));
+    this.filter = filter;
+    this.filters = {};
+    for (const group in GROUPS) this.show[group] = true;
     this.showEnd();
     this.listEvents();
   }
@@ -57,26 +59,30 @@ class Panel {
     find("excuse").hidden = verdict.excuse === null;
   }
 
-  addFilter(group, name, filter) {
-    this.show[group] = true;
-    const label = find("filters").appendChild(make("label", "", group));
+  // A filter for each group that has marks, with their number.
+  listFilters() {
+    const groups = Object.keys(GROUPS).filter((group) => this.marks.count(group));
+    const added = groups.filter((group) => !this.filters[group]);
+    for (const group of added) this.filters[group] = this.makeFilter(group);
+    if (added.length) find("filters").append(...groups.map((group) => this.filters[group]));
+    for (const group of groups) this.filters[group].lastChild.textContent = String(this.marks.count(group));
+  }
+
+  makeFilter(group) {
+    const label = make("label", "", group);
     const box = label.appendChild(make("input"));
     Object.assign(box, { type: "checkbox", checked: true, id: `filter-${group}` });
-    label.append(make("i"), make("span", `${name} `), make("small"));
+    label.append(make("i"), make("span", `${GROUPS[group]} `), make("small"));
     box.addEventListener("change", () => {
       this.show[group] = box.checked;
-      filter();
+      this.filter();
     });
-    return { group, label };
+    return label;
   }
 
   // List the marks that are shown, the first `MOST_EVENTS` of them.
   listEvents() {
-    for (const { group, label } of this.filters) {
-      const count = this.marks.count(group);
-      label.hidden = !count;
-      label.lastChild.textContent = String(count);
-    }
+    this.listFilters();
     const shown = this.marks.shown(this.show);
     this.listed = shown.slice(0, MOST_EVENTS);
     find("events").replaceChildren();
