@@ -1,4 +1,4 @@
-"""Makes the code of the LCM messages; puts the commit, Gazebo's script, and machine code into what is built.
+"""Makes the code of the LCM messages; puts the commit, the norm, Gazebo's script, and machine code into what is built.
 
 All else stands in pyproject.toml. Machine code lies in the folder that DUBINS_TRAFFIC_MACHINE names, where
 `dubins-traffic build --folder` has put it (scripts/release.sh). A wheel with it is one for Linux on x86-64, whichever
@@ -20,6 +20,7 @@ NAME = "commit.txt"
 HERE = Path(__file__).parent
 PACKAGE = Path("src") / "dubins_traffic"
 INSTALLER = "gazebo-packages.sh"
+NORM = Path("docs") / "rules.md"
 MACHINE = os.environ.get("DUBINS_TRAFFIC_MACHINE", "")
 SYSTEM = "manylinux_2_17_x86_64"
 """Where the libraries run: they need nothing of the system but what fills memory."""
@@ -39,7 +40,7 @@ def commit() -> str:
 
 
 class WithCommit(build_py):
-    """The modules, and beside them the commit, the script that fetches Gazebo, and machine code if there is any."""
+    """The modules, and beside them the commit, the norm, Gazebo's script, and machine code if there is any."""
 
     def run(self) -> None:
         """Build the modules; an editable installation stays as it is."""
@@ -49,6 +50,7 @@ class WithCommit(build_py):
         package = Path(self.build_lib) / "dubins_traffic"
         (package / NAME).write_text(commit(), encoding="ascii")
         shutil.copy(HERE / "scripts" / INSTALLER, package / "gazebo")
+        shutil.copy(HERE / NORM, package / "rules")
         shutil.rmtree(package / "machine", ignore_errors=True)  # of a wheel that was built here before
         if MACHINE:
             shutil.copytree(MACHINE, package / "machine")

@@ -24,8 +24,8 @@ from benchmarks.table import Row, show
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, queue, submissions
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.database_tables import Account, Competition, Phase
 from dubins_traffic.service.submissions import Upload
-from dubins_traffic.service.tables import Account, Competition, Phase
 
 READERS = 50
 SECONDS = 20.0
@@ -107,7 +107,7 @@ def delay() -> int:
             )
             session.add(phase)
             for k in range(2):
-                team = accounts.found_team(session, f"t{k}", 0.0)
+                team = accounts.make_team(session, f"t{k}", 0.0)
                 account = Account(name=f"a{k}", password="", role="participant", team=team, created=0.0)
                 session.add(account)
                 session.flush()

@@ -209,15 +209,15 @@ def _taken(world: Configuration, trials: int) -> tuple[float, float]:
     def watched(*_: object) -> Iterator[LocalRunner]:
         yield crew
 
-    real = search.crew_of
-    search.crew_of = watched  # pyright: ignore[reportAttributeAccessIssue]  # the search is timed with a crew that watches
+    real = search.runner_of
+    search.runner_of = watched  # pyright: ignore[reportAttributeAccessIssue]  # the search is timed with a crew that watches
     try:
         with tempfile.TemporaryDirectory() as folder:
             began = time.process_time()
             falsify(_anew(world), "rules", Path(folder) / "found", trials=trials, seed=2)
             searched = time.process_time() - began
     finally:
-        search.crew_of = real
+        search.runner_of = real
     roads = draw(_anew(world)).problem.network
     own = [replace(one, problem=replace(one.problem, network=roads)) for one in crew.seen]
     crew.seen.clear()

@@ -13,7 +13,7 @@ from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.kernels.random import DRAW, below
 from dubins_traffic.kernels.records import Rows, record, table
-from dubins_traffic.synthesis.board import Tables
+from dubins_traffic.synthesis.board import BoardTables
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
 from dubins_traffic.synthesis.moves import list_moves
 from dubins_traffic.synthesis.positions import Moves, Numbers, Work
@@ -131,14 +131,14 @@ def play(
     first = strategy.first() if position is None else position
     if not strategy.wins(first):
         raise InputError("the strategy does not win from there", field="position", value=first)
-    targets = len(board.arena.targets)
+    targets = len(board.road_cells.targets)
     started = table(Now, 1)
     now = started[0]
     now.seed, now.environment, now.position = np.uint64(seed), int(environment), first
     state = Table(
         np.stack([own.rank for own in strategy.ranks]),
         started,
-        np.zeros(board.arena.cells + len(board.arena.goals), dtype=np.int64),
+        np.zeros(board.road_cells.cells + len(board.road_cells.goals), dtype=np.int64),
         *(np.zeros(targets, dtype=np.int64) for _ in range(3)),
     )
     moves = Room(Work.of(board), room(board, 1, LARGEST_CHOICE), room(board, 1, LARGEST_CHOICE))
@@ -189,7 +189,7 @@ def _answer(ranks: Numbers, goal: int, out: Moves) -> int:
 
 
 @jit
-def _worst(t: Tables, ranks: Numbers, goal: int, must: int, room: Room, first: int) -> int:
+def _worst(t: BoardTables, ranks: Numbers, goal: int, must: int, room: Room, first: int) -> int:
     """Return the move of the environment that leaves the ego the highest rank.
 
     Of equals the first from `first` on; only moves in which a car of the bits `must` goes, if any.
@@ -212,7 +212,7 @@ def _worst(t: Tables, ranks: Numbers, goal: int, must: int, room: Room, first: i
 
 
 @jit_long
-def play_turns(t: Tables, turns: int, room: Room, table: Table) -> None:
+def play_turns(t: BoardTables, turns: int, room: Room, table: Table) -> None:
     """Play turns; stop where a position has no rank.
 
     Parameters

@@ -17,10 +17,10 @@ from tests.game_reference import Arrays
 from tests.property.test_game_reference import SQUARE, position, reference
 
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Leaving
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Solution, solve
 from dubins_traffic.synthesis.strategy import Strategy
@@ -92,8 +92,8 @@ print(json.dumps([seconds, resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 
 def board(rows: int, columns: int, others: int, assumed: str = ALL, order_degree: int = 1) -> Board:
     """Return the positions on a grid with goals at two opposite corners."""
     network = RoadNetwork.grid(rows, columns)
-    arena = Arena.of(network, [0, len(network.intersections) - 1], order_degree)
-    return Board(arena, Assumption.parse(assumed.split(",")), others)
+    road_cells = RoadCells.of(network, [0, len(network.intersections) - 1], order_degree)
+    return Board(road_cells, Assumption.parse(assumed.split(",")), others)
 
 
 def measure() -> list[Row]:
@@ -105,7 +105,7 @@ def measure() -> list[Row]:
         if case[:5] in ((3, 4, 3, ALL, 1), (3, 3, 4, ALL, 1)):
             rows += _played(f"{case[0]}x{case[1]}, {case[2]} cars", Strategy.of(solution))
     sizes = [(*size, degree) for degree in (1, 3) for size in ((2, 2), (3, 4), (3, 3), (4, 4))]
-    bounds = [route_bound(board(*size, 1, ALL, degree).arena, Assumption()) for *size, degree in sizes]
+    bounds = [route_bound(board(*size, 1, ALL, degree).road_cells, Assumption()) for *size, degree in sizes]
     known = [9, 41, 28, 59, 3, 36, 23, 55]
     name = "bound of fixed routes, 2x2, 3x4, 3x3 and 4x4, crossings from 1 and from 3"
     return [*rows, Row(name, f"{bounds}", f"{known}", bounds == known)]
@@ -146,18 +146,18 @@ def _played(name: str, strategy: Strategy) -> list[Row]:
 
 def request(some: Board, *, lost: bool = False) -> dict[str, Any]:
     """Return a game as `tests/crosscheck/omega_game.py` takes it."""
-    arena, assumed = some.arena, some.assumption
+    road_cells, assumed = some.road_cells, some.assumption
     return {
-        "following": [list(arena.following(cell)) for cell in range(arena.cells)],
-        "nodes": len(arena.nodes),
-        "goals": [list(nodes) for nodes in arena.goal_nodes],
-        "targets": [list(nodes) for nodes in arena.targets],
+        "following": [list(road_cells.following(cell)) for cell in range(road_cells.cells)],
+        "nodes": len(road_cells.nodes),
+        "goals": [list(nodes) for nodes in road_cells.goal_nodes],
+        "targets": [list(nodes) for nodes in road_cells.targets],
         "others": some.others,
         "ordered": assumed.order == "kept",
-        "enters": [n for n, node in enumerate(arena.nodes) if _entered(node.crossing, assumed)],
-        "crossings": [n for n, node in enumerate(arena.nodes) if node.crossing],
-        "opposite": [arena.opposite(n) for n in range(len(arena.nodes))],
-        "beside": [_beside(arena, n) for n in range(len(arena.nodes))],
+        "enters": [n for n, node in enumerate(road_cells.nodes) if _entered(node.crossing, assumed)],
+        "crossings": [n for n, node in enumerate(road_cells.nodes) if node.crossing],
+        "opposite": [road_cells.opposite(n) for n in range(len(road_cells.nodes))],
+        "beside": [_beside(road_cells, n) for n in range(len(road_cells.nodes))],
         "leaves": assumed.leaves is not Leaving.NEVER,
         "unmet": assumed.leaves is Leaving.UNMET,
         "moves_up": assumed.arrives is Arriving.MOVES_UP,
@@ -166,9 +166,9 @@ def request(some: Board, *, lost: bool = False) -> dict[str, Any]:
     }
 
 
-def _beside(arena: Arena, node: int) -> list[int]:
+def _beside(road_cells: RoadCells, node: int) -> list[int]:
     """Return the exits of a node and the lanes beside them."""
-    return [len(arena.nodes) + lane for out in arena.nodes[node].exits for lane in (out, out ^ 1)]
+    return [len(road_cells.nodes) + lane for out in road_cells.nodes[node].exits for lane in (out, out ^ 1)]
 
 
 def _entered(crossing: bool, assumed: Assumption) -> bool:

@@ -32,7 +32,7 @@ from dubins_traffic.routing.rounds import round_time
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.instance import arena_of, assumption_of
+from dubins_traffic.synthesis.instance import assumption_of, cells_of
 from dubins_traffic.synthesis.road_play import NEW_TICKET, UNKNOWN_MOVE
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
@@ -138,7 +138,7 @@ def save_strategies(folder: str) -> None:
     """Write the strategies for the grid against 1 to 3 e-agents."""
     for cars in (1, 2, 3):
         problem = instance(0).problem
-        board = Board(arena_of(problem), assumption_of(problem), cars)
+        board = Board(cells_of(problem), assumption_of(problem), cars)
         Strategy.of(solve(build(board))).save(Path(folder) / f"{cars}.npz")
 
 

@@ -72,7 +72,8 @@ def copy_with_rule(folder: Path, number: int) -> None:
     _edit(kernel, r"(?<=import judge_)entry(?=, )", "change, judge_entry")
     call = "    judge_change(car, lane, tick, tables.terms[b], log)\n"
     _edit(kernel, r"^    judge_turn\(car, bits, lane, tick, log\)\n", rf"\g<0>{call}")
-    _edit(own / "viewer" / "marks.py", r"^RULES = \{\n", rf'\g<0>    "{NAME}": "changes its lane",\n')
+    words = f'    "{NAME}": Words("changes its lane", "The ego keeps its lane for a minute."),\n'
+    _edit(own / "rules" / "explained.py", r"^RULE_WORDS: .* = \{\n", rf"\g<0>{words}")
 
 
 def changed(folder: Path) -> set[str]:

@@ -65,27 +65,6 @@ class Controller:
         ahead, left = c * dx + s * dy, c * dy - s * dx
         return (0.0, 0.9) if ahead < abs(left) else (0.5, max(-0.9, min(left, 0.9)))
 """,
-    "waits": """
-import sys
-
-class Controller:
-    def start(self, problem):
-        self.goals = [problem.network.points[vertex] for vertex in problem.goal_vertices]
-        self.near2 = (0.5 * problem.intersection_radius) ** 2
-        print(f"{len(self.goals)} goals", file=sys.stderr)
-
-    def act(self, observation):
-        x, y, c, s = observation.pose  # (c, s) is the heading, a unit vector
-        for car in observation.others:
-            dx, dy = car.pose.x - x, car.pose.y - y
-            if 0.0 < c * dx + s * dy < 1.2 and abs(c * dy - s * dx) < 0.5:
-                return (0.0, 0.0)
-        dx, dy = self.goals[0] - (x, y)
-        if dx * dx + dy * dy < self.near2:
-            self.goals.append(self.goals.pop(0))
-        ahead, left = c * dx + s * dy, c * dy - s * dx
-        return (0.0, 0.9) if ahead < abs(left) else (0.5, max(-0.9, min(left, 0.9)))
-""",
     "speaks_lines": """#!/usr/bin/python3
 import json, sys
 

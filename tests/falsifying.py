@@ -7,7 +7,7 @@ from typing import Any
 
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.engine.group import Group
-from dubins_traffic.falsification.splitting import Begin, Watched
+from dubins_traffic.falsification.splitting import Begin, MeasuredGroup
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.instance import Instance, Problem
 
@@ -40,8 +40,8 @@ def corridor(crossings: int) -> Configuration:
 def standing(rule: str = "1.collision") -> Begin:
     """Return what begins trials whose egos stand."""
 
-    def begin(instances: Sequence[Instance]) -> Watched:
-        return Watched(Group(instances, keeps_rules=False), rule)
+    def begin(instances: Sequence[Instance]) -> MeasuredGroup:
+        return MeasuredGroup(Group(instances, keeps_rules=False), rule)
 
     return begin
 

@@ -11,7 +11,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.instance import arena_of, assumption_of, cell_of
+from dubins_traffic.synthesis.instance import assumption_of, cell_of, cells_of
 
 ROAD: dict[str, Any] = {
     "version": 1,
@@ -32,18 +32,18 @@ def instance() -> Instance:
 
 
 def board_of(some: Instance) -> Board:
-    return Board(arena_of(some.problem), assumption_of(some.problem), len(some.e_agents))
+    return Board(cells_of(some.problem), assumption_of(some.problem), len(some.e_agents))
 
 
 def starts_of(some: Instance) -> list[int]:
     board = board_of(some)
-    return [cell_of(board.arena, some.problem, pose) for pose in some.starts]
+    return [cell_of(board.road_cells, some.problem, pose) for pose in some.starts]
 
 
 def round_trip() -> dict[int, int]:
     """Return the cell after each cell."""
     board = board_of(instance())
-    return {cell: board.arena.following(cell)[0] for cell in range(board.arena.cells)}
+    return {cell: board.road_cells.following(cell)[0] for cell in range(board.road_cells.cells)}
 
 
 def machine() -> tuple[int, dict[tuple[int, int], int]]:

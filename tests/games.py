@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from functools import cache
 
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.solver import Solution, solve
 
 ALL = "E1,E2,E3,E4,E5,E6"
@@ -18,8 +18,8 @@ ALL = "E1,E2,E3,E4,E5,E6"
 def board(rows: int, columns: int, others: int, assumed: str = ALL, order_degree: int = 1) -> Board:
     """Return the positions on a grid with goals at two opposite corners."""
     network = RoadNetwork.grid(rows, columns)
-    arena = Arena.of(network, [0, len(network.intersections) - 1], order_degree)
-    return Board(arena, Assumption.parse(word for word in assumed.split(",") if word), others)
+    road_cells = RoadCells.of(network, [0, len(network.intersections) - 1], order_degree)
+    return Board(road_cells, Assumption.parse(word for word in assumed.split(",") if word), others)
 
 
 PAN = ((0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 1, 1), (0, 1, 1, 1), (1, 1, 2, 1))
@@ -29,7 +29,7 @@ PAN = ((0, 0, 1, 0), (0, 0, 0, 1), (1, 0, 1, 1), (0, 1, 1, 1), (1, 1, 2, 1))
 def pan(others: int, goals: Sequence[int], assumed: str = ALL, order_degree: int = 1) -> Board:
     """Return the positions on a square with a handle, whose end is node 4."""
     network = RoadNetwork(PAN, 3.0, (0.0, 0.0, 0.0), (2, 3))
-    return Board(Arena.of(network, goals, order_degree), Assumption.parse(assumed.split(",")), others)
+    return Board(RoadCells.of(network, goals, order_degree), Assumption.parse(assumed.split(",")), others)
 
 
 @cache

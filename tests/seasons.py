@@ -15,8 +15,8 @@ from sqlalchemy import func, select
 
 from dubins_traffic.service.client import TOKEN
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.database_tables import Chunk, Submission, Trial
 from dubins_traffic.service.storage import Storage
-from dubins_traffic.service.tables import Chunk, Submission, Trial
 from tests.services import Person, Service, competition_text, serving
 
 FAULTS = int(os.environ.get("DUBINS_TRAFFIC_FAULTS", "3"))

@@ -23,7 +23,7 @@ from dubins_traffic.campaign.report.statistics import clopper_pearson
 from dubins_traffic.engine.group import Group
 from dubins_traffic.falsification.estimate import Replicas, combined
 from dubins_traffic.falsification.sampling import STREAM, prepared
-from dubins_traffic.falsification.splitting import Watched, split
+from dubins_traffic.falsification.splitting import MeasuredGroup, split
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw_many
 from dubins_traffic.problem.instance import Instance
@@ -66,9 +66,9 @@ class Traffic:
     keeps_rules: bool
     alike: bool
 
-    def begin(self, instances: Sequence[Instance]) -> Watched:
+    def begin(self, instances: Sequence[Instance]) -> MeasuredGroup:
         """Begin trials of instances."""
-        return Watched(Group(instances, keeps_rules=self.keeps_rules), RULE)
+        return MeasuredGroup(Group(instances, keeps_rules=self.keeps_rules), RULE)
 
 
 def probability(own: Traffic, below: float) -> float | None:

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import Cast, Crew
+from dubins_traffic.envs.crew import MultiAgentTrials, Roles
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import PARTS, TERM, WEIGHTS
 from dubins_traffic.kernels.arrays import Floats
@@ -55,8 +55,8 @@ def beginner() -> Floats:
 def drive(ego: str, policies: Sequence[Floats] | None, seed: int, trials: Sequence[int]) -> dict[str, Floats]:
     """Drive trials of a seed, each with its own policy, or with `lawful` e-agents; return what came of each."""
     learned = list(range(1, CARS + 1)) if policies is not None else []
-    cast = Cast(learned, ego, dict.fromkeys(learned, "sure"), excuses=False)
-    crew = Crew(SETTINGS.episodes.draw([(seed, trial, 0) for trial in trials]), cast, SETTINGS)
+    roles = Roles(learned, ego, dict.fromkeys(learned, "sure"), excuses=False)
+    crew = MultiAgentTrials(SETTINGS.episodes.draw([(seed, trial, 0) for trial in trials]), roles, SETTINGS)
     asked, broken = np.zeros((*crew.group.state.x.shape, 2)), np.zeros((len(trials), len(PARTS)))
     paid, stacked = np.zeros(len(trials)), np.array(policies) if policies is not None else None
     bounds = SETTINGS.sample.problem.car.bounds

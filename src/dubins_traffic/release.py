@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 from functools import cache
-from importlib.metadata import version
+from importlib.metadata import metadata, version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -36,6 +36,12 @@ class Release(NamedTuple):
 def release() -> Release:
     """Return which state of the package this is."""
     return Release(version("dubins-traffic"), _commit(), sources_hash())
+
+
+def homepage() -> str:
+    """Return the address of the project's site, as the package's metadata have it."""
+    named = dict(entry.split(", ", 1) for entry in metadata("dubins-traffic").get_all("Project-URL", []))
+    return named["Homepage"]
 
 
 @cache

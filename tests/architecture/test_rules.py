@@ -6,8 +6,8 @@ import re
 from pathlib import Path
 
 from dubins_traffic.rules.breach_log import RULE, RULES
+from dubins_traffic.rules.explained import RULE_WORDS
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
-from dubins_traffic.viewer import marks
 from tests.added_rule import changed, copy_with_rule
 from tests.architecture.house import PACKAGE, ROOT, modules
 
@@ -30,7 +30,7 @@ def test_a_rule_touches_the_files_that_the_page_lists() -> None:
     for rule in EGO_RULES:
         found = files_that_know(rf"\"{re.escape(rule)}\"|RULE\.{numbers[rule]}\b")
         assert {file for file in found if not KNOW_SOME.match(file)} <= LISTED, rule
-        assert {"rules/breach_log.py", "viewer/marks.py"} <= found, rule
+        assert {"rules/breach_log.py", "rules/explained.py"} <= found, rule
 
 
 def test_the_rule_of_the_example_changes_the_files_that_the_page_lists(tmp_path: Path) -> None:
@@ -40,7 +40,7 @@ def test_the_rule_of_the_example_changes_the_files_that_the_page_lists(tmp_path:
 
 def test_nothing_of_a_rule_is_missing() -> None:
     assert len(RULE) == len(RULES)
-    assert set(marks.RULES) == set(RULES)
+    assert set(RULE_WORDS) == set(RULES)
     anchors = set(re.findall(r'<a id="([^"]+)">', (ROOT / "docs" / "rules.md").read_text(encoding="utf-8")))
     assert set(RULES) <= anchors
     assert {rule.partition(".")[0] for rule in RULES if rule not in EGO_RULES} <= set(ASSUMPTIONS)

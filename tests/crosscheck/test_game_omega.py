@@ -31,9 +31,9 @@ def omega() -> Iterator[Solvers]:
 
 def number(some: Board, cells: list[int], before: set[tuple[int, int]]) -> int:
     """Return the position of labelled cars, of which some are before others in one crossing."""
-    count = len(some.arena.nodes)
+    count = len(some.road_cells.nodes)
     scenes: list[Scene] = []
-    for n, node in enumerate(some.arena.nodes):
+    for n, node in enumerate(some.road_cells.nodes):
         inside = (WHO.OTHER if cells.index(n) else WHO.EGO) if n in cells else None
         lanes = [count + lane for lane in node.inbound]
         waiting = [car for car, cell in enumerate(cells) if cell in lanes]
@@ -64,7 +64,7 @@ def number(some: Board, cells: list[int], before: set[tuple[int, int]]) -> int:
         pan(2, (0, 2), "E1,E2,E3,E5"),
         pan(2, (4,), ALL),
     ],
-    ids=lambda some: f"{some.arena.cells} cells, {some.others} cars, {some.assumption}",
+    ids=lambda some: f"{some.road_cells.cells} cells, {some.others} cars, {some.assumption}",
 )
 def test_winners_are_those_of_omega(some: Board, omega: Solvers) -> None:
     solution = solve(build(some))

@@ -27,22 +27,22 @@ pytestmark = pytest.mark.tools
 
 def positions(some: Board, count: int) -> Iterator[tuple[list[int], int]]:
     """Yield cells of the cars and the position that they make, no two cars before one crossing."""
-    arena = some.arena
-    cells = list(permutations(range(arena.cells), some.others + 1))
+    road_cells = some.road_cells
+    cells = list(permutations(range(road_cells.cells), some.others + 1))
     Random(2016).shuffle(cells)
-    nodes = len(arena.nodes)
+    nodes = len(road_cells.nodes)
     for own in cells:
-        ends = [arena.lane_end[cell - nodes][0] for cell in own if cell >= nodes]
+        ends = [road_cells.lane_end[cell - nodes][0] for cell in own if cell >= nodes]
         if len(set(ends)) == len(ends) and count:
             count -= 1
             yield list(own), some.number([_scene(some, node, own) for node in range(nodes)])
 
 
 def _scene(some: Board, node: int, cells: tuple[int, ...]) -> Scene:
-    nodes = len(some.arena.nodes)
+    nodes = len(some.road_cells.nodes)
     who = [WHO.EGO if car == 0 else WHO.OTHER for car in range(len(cells))]
     inside = who[cells.index(node)] if node in cells else None
-    lanes = [nodes + lane for lane in some.arena.nodes[node].inbound]
+    lanes = [nodes + lane for lane in some.road_cells.nodes[node].inbound]
     return Scene(inside, tuple((lanes.index(cell), who[k]) for k, cell in enumerate(cells) if cell in lanes))
 
 
@@ -66,7 +66,7 @@ FULL = os.environ.get("DUBINS_TRAFFIC_SPECIFICATIONS") == "full"
 
 
 def called(some: Board) -> str:
-    return f"{some.arena.cells} cells, {some.others} cars, {some.assumption}"
+    return f"{some.road_cells.cells} cells, {some.others} cars, {some.assumption}"
 
 
 @pytest.fixture(scope="module")

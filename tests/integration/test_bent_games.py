@@ -16,10 +16,10 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.runs.single import run_trial
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.road_play import UNKNOWN_MOVE, Ground
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Strategy
@@ -39,9 +39,11 @@ def test_the_game_does_not_change_where_roads_bend() -> None:
     assert straight.is_straight
     found: list[Any] = []
     for network in (straight, bent):
-        arena = Arena.of(network, (0, 3), 3)
-        solution = solve(build(Board(arena, Assumption.parse(ALL), 1)))
-        found.append((arena.nodes, Strategy.of(solution).board.others, solution.game.positions, solution))
+        road_cells = RoadCells.of(network, (0, 3), 3)
+        solution = solve(build(Board(road_cells, Assumption.parse(ALL), 1)))
+        found.append(
+            (road_cells.nodes, Strategy.of(solution).board.others, solution.game.positions, solution)
+        )
     assert found[0][:3] == found[1][:3]
     assert all(
         np.array_equal(one.lost, other.lost)
@@ -51,8 +53,8 @@ def test_the_game_does_not_change_where_roads_bend() -> None:
 
 @pytest.mark.parametrize("network", [RING, SNAKE], ids=["ring", "snake"])
 def test_cells_know_how_far_along_a_bend_a_car_is_and_where_it_may_be(network: Any) -> None:
-    arena = Arena.of(network, (0,), 3)
-    ground, nodes = Ground(arena), len(arena.nodes)
+    road_cells = RoadCells.of(network, (0,), 3)
+    ground, nodes = Ground(road_cells), len(road_cells.nodes)
     for lane in range(network.lanes):
         track = Track(network, lane >> 1)
         spots = [track.point(along) for along in np.linspace(1.3, track.length - 1.3, 9)]

@@ -21,7 +21,9 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 
 from dubins_traffic.campaign import manifest
-from dubins_traffic.campaign.report.comparison import compare
+from dubins_traffic.campaign.report.comparison import Comparison, compare
+from dubins_traffic.campaign.report.conclusion import conclusion
+from dubins_traffic.campaign.report.latex import latex_table
 from dubins_traffic.campaign.report.write import page, write_report
 from dubins_traffic.campaign.results import load_results
 from dubins_traffic.campaign.run_campaign import run_campaign
@@ -41,6 +43,8 @@ TEN = {
     "formulas": {"goes on a road": "F on_road_ego", "stays": "G on_road_ego"},
 }
 CONTROLLERS = ["lanes", "simple", "simple+shield"]
+MOST_SCREENS = 4
+"""So long may the page be before anything on it is opened, in windows of 1280 by 800 pixels."""
 DOCUMENT = campaign(
     name="<b>two & <i>two",
     controllers=CONTROLLERS,
@@ -161,6 +165,10 @@ def test_the_page_in_a_browser(folder: Path, browser: webdriver.Chrome) -> None:
     browser.get((folder / "report" / "index.html").as_uri())
     assert browser.title == DOCUMENT["name"]
     assert browser.find_element(By.TAG_NAME, "h1").text == DOCUMENT["name"]
+    assert browser.find_element(By.CSS_SELECTOR, ".conclusion").text == conclusion(compared(folder))
+    high = browser.execute_script("return document.documentElement.scrollHeight")
+    assert high <= MOST_SCREENS * 800
+    open_all(browser)
     sizes = browser.execute_script("return [...document.images].map(image => image.naturalWidth)")
     assert len(sizes) > 10
     assert min(sizes) > 100
@@ -171,6 +179,32 @@ def test_the_page_in_a_browser(folder: Path, browser: webdriver.Chrome) -> None:
     browser.get(str(links[0]))
     assert "Trial" in browser.title
     assert browser.get_log("browser") == []
+
+
+@pytest.mark.tools("browser")
+@pytest.mark.parametrize("width", [1280, 400])
+def test_letters_of_charts_are_as_large_as_those_of_the_page(
+    width: int, folder: Path, browser: webdriver.Chrome
+) -> None:
+    size = {"width": width, "height": 800, "deviceScaleFactor": 1, "mobile": width < 600}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    browser.get((folder / "report" / "index.html").as_uri())
+    open_all(browser)
+    sizes = browser.execute_script(
+        "return [...new Set([...document.querySelectorAll('p, td, th, li, h3, code')]"
+        ".map(e => getComputedStyle(e).fontSize))]"
+    )
+    assert sizes == ["14px"]
+    charts = browser.execute_script(
+        "return [...document.images].map(i => [i.clientWidth / i.naturalWidth, atob(i.currentSrc.split(',')[1])])"
+    )
+    assert len(charts) > 10
+    for scale, svg in charts:
+        assert scale == pytest.approx(1.0, abs=0.005)
+        letters = {
+            float(points) * 4 / 3 for points in re.findall(r"font(?:-size)?: (?:\w+ )?([\d.]+)px", svg)
+        }
+        assert letters == {14.0}
 
 
 @pytest.mark.tools("browser")
@@ -190,11 +224,33 @@ def test_the_page_is_dark_where_it_should_be_and_nothing_scrolls_sideways(
     size = {"width": 400, "height": 800, "deviceScaleFactor": 1, "mobile": True}
     browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     browser.get((folder / "report" / "index.html").as_uri())
+    open_all(browser)
     wide = browser.execute_script(
         "return [...document.querySelectorAll('*')].filter(e => e.scrollWidth > e.clientWidth + 1 && e.clientWidth"
         " || e.getBoundingClientRect().right > 400.5).map(e => e.outerHTML.slice(0, 90))"
     )
     assert wide == []
+
+
+def compared(folder: Path) -> Comparison:
+    results = load_results(folder)
+    return compare(results.campaign, results.table)
+
+
+def open_all(browser: webdriver.Chrome) -> None:
+    browser.execute_script("document.querySelectorAll('details').forEach(d => { d.open = true })")
+
+
+def test_a_paper_gets_a_table_and_figures(folder: Path) -> None:
+    made = folder / "report"
+    assert (made / "table.tex").read_text() == latex_table(compared(folder))
+    names = {path.name for path in (made / "figures").iterdir()}
+    assert {"ranking.pdf", "verdicts.pdf", "faults.pdf", "formula-1.pdf", "formula-2.pdf"} <= names
+    assert "rounds_before_breach-against-e_agents.pdf" in names
+    for path in (made / "figures").iterdir():
+        data = path.read_bytes()
+        assert data.startswith(b"%PDF-")
+        assert b"/Type3" not in data, "publishers want fonts that are no drawings"
 
 
 def test_results_are_a_table_a_dict_and_a_picture(folder: Path) -> None:
@@ -253,17 +309,24 @@ def browser(tmp_path: Path) -> Iterator[webdriver.Chrome]:
 
 
 def test_a_report_in_the_terminal(folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["campaign", "report", str(folder), "-o", str(tmp_path / "r"), "--worst", "0", "--wall"]) == 0
+    words = ["campaign", "report", str(folder), "-o", str(tmp_path / "r"), "--worst", "0", "--wall"]
+    assert main([*words, "--all"]) == 0
+    everything = capsys.readouterr().out
+    assert "time to" in everything
+    assert all(metric.label.split()[0] in everything for metric in compared(folder).metrics)
+    assert main([*words, "--overwrite"]) == 0
     told = capsys.readouterr().out
     assert "36 of 36 trials" in told
-    assert "time to" in told
+    assert len(told.rstrip().split("\n")) <= 30
+    assert max(len(line.rstrip()) for line in told.split("\n")[:-2]) <= 80
+    assert conclusion(compared(folder)).split(":")[0] in told
     assert not (tmp_path / "r" / "replays").exists()
 
 
 def test_the_terminal_names_the_worst_trials_and_how_to_replay_them(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["campaign", "report", str(folder), "-o", str(tmp_path / "r"), "--worst", "1"]) == 0
+    assert main(["campaign", "report", str(folder), "-o", str(tmp_path / "r"), "--worst", "1", "--all"]) == 0
     told = capsys.readouterr().out
     commands = re.findall(r"^ +dubins-traffic (campaign replay \S+ \d+)$", told, re.MULTILINE)
     assert len(commands) == len(CONTROLLERS)

@@ -17,7 +17,7 @@ from dubins_traffic.falsification.archive import files
 from dubins_traffic.falsification.case import Case, confirm, judge, read_case
 from dubins_traffic.falsification.estimate import by_counting, by_splitting, drawn
 from dubins_traffic.falsification.shrink import single_removals
-from dubins_traffic.falsification.splitting import Particle, Watched, follow, split
+from dubins_traffic.falsification.splitting import MeasuredGroup, Particle, follow, split
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import NEAR, Rolling, corridor, standing
 from tests.minute import a_minute
@@ -190,7 +190,7 @@ def test_a_particle_that_branches_off_is_a_fork_bit_for_bit() -> None:
     begin = standing()
     whole = begin(instances)
     whole.advance(90)
-    twin = Watched(whole.group.fork(range(4), [7, 8, 9, 10]), whole.rule)
+    twin = MeasuredGroup(whole.group.fork(range(4), [7, 8, 9, 10]), whole.rule)
     whole.reseed([7, 8, 9, 10])
     for own in (whole, twin):
         own.advance(instances[0].ticks - 90)

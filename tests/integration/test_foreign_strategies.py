@@ -310,7 +310,7 @@ def test_specifications_keep_to_their_grammars(some: Any, cells: list[int]) -> N
     spec = specification(some, cells)
     assert tlsf["inputs"] == slugs["INPUT"] == list(spec.inputs)
     assert tlsf["outputs"] == slugs["OUTPUT"] == list(spec.outputs)
-    assert len(slugs["SYS_LIVENESS"]) == len(some.arena.targets)
+    assert len(slugs["SYS_LIVENESS"]) == len(some.road_cells.targets)
 
 
 @pytest.mark.parametrize(

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import json
 import os
 import re
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -17,11 +19,48 @@ from dubins_traffic.campaign.report.statistics import estimate
 from tests.integration.test_readme import FILE_NAME, ROOT, runnable
 
 KEEPER = f"{ROOT / 'examples' / 'lane_keeper.py'}:LaneKeeper"
+STABILITY = (ROOT / "docs" / "stability.md").read_text(encoding="utf-8")
 TUTORIAL = (ROOT / "docs" / "tutorials" / "lane-keeper.md").read_text(encoding="utf-8")
 TRIALS = 40
 FEW = 3
 MOST_LINES = 60
 """Of code that a user writes in the tutorial, blank lines left out."""
+
+
+def public_names() -> set[str]:
+    """Return the names that stay within a major version, as the page on stability says: what the package exports."""
+    row = re.search(r"^\| \*\*API\*\* \| (.*) \|$", STABILITY, re.MULTILINE)
+    assert row
+    assert row[1].startswith("Names that `dubins_traffic` exports")
+    assert "Everything else is internal" in row[1]
+    exported = [getattr(dt, name) for name in dt.__all__]
+    return {*dt.__all__, *(name for own in exported if isinstance(own, type) for name in dir(own))}
+
+
+def internal_names(files: Sequence[str]) -> set[str]:
+    """Return what files use of the package that the page on stability does not call public.
+
+    A name after a dot counts unless a file defines it, or a module of Python's own or another of the files has it.
+    """
+    trees = [ast.parse(code) for code in files]
+    nodes = [node for tree in trees for node in ast.walk(tree)]
+    brought = {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    brought |= {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    own = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)}
+    own |= {
+        node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
+    }
+    used = {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)}
+    inner = {
+        name for name in brought if name.partition(".")[0] == "dubins_traffic" and name != "dubins_traffic"
+    }
+    return inner | (used - own - public_names()) | {name for name in used if name.startswith("_")}
+
+
+def test_a_name_that_is_not_public_is_found() -> None:
+    assert internal_names(["import dubins_traffic.rules\n"]) == {"dubins_traffic.rules"}
+    assert internal_names(["import dubins_traffic as dt\ndt.kernels.boxes\n"]) == {"kernels", "boxes"}
+    assert internal_names(["def f(o):\n    return o.propositions.stopped, o._hidden\n"]) == {"_hidden"}
 
 
 def scores(configuration: str, controller: str, trials: int) -> tuple[dt.Score, ...]:
@@ -59,8 +98,7 @@ def test_each_step_of_the_tutorial_is_better_and_the_last_is_clean(
         (tmp_path / named[1]).write_text(code)
     lines = [line for code in written for line in code.splitlines() if line.strip()]
     assert len(lines) <= MOST_LINES
-    assert {*re.findall(r"dubins_traffic[\w.]*", "\n".join(lines))} == {"dubins_traffic"}
-    assert {*re.findall(r"\bdt\.(\w+)", "\n".join(lines))} <= {*dt.__all__}
+    assert internal_names(written) == set()
     monkeypatch.chdir(tmp_path)
     steps = ("follow.py:Follow", "stops.py:Stops", "lane_keeper.py:LaneKeeper")
     found = [scores("junction", step, FEW) for step in steps]

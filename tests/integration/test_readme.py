@@ -15,6 +15,7 @@ import pytest
 
 from dubins_traffic import run_batch, run_trial
 from tests.minute import a_minute
+from tests.shown_scores import require_progress, tables
 
 ROOT = Path(__file__).parents[2]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -36,15 +37,16 @@ def runnable(page: str) -> list[tuple[str, str]]:
     ]
 
 
-def run_block(language: str, text: str, folder: Path) -> None:
+def run_block(language: str, text: str, folder: Path) -> str:
     """Run a block of shell or Python in `folder`, or save it if its first line names a file.
 
-    On standard error stand the files that were written, and what a search has not met, and nothing else.
+    Returns what it printed. On standard error stand the files that were written, what a search has not met, and
+    nothing else.
     """
     named = FILE_NAME.match(text)
     if named:
         (folder / named[1]).write_text(text)
-        return
+        return ""
     program = ["bash", "-euo", "pipefail", "-c"] if language == "sh" else [sys.executable, "-c"]
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     ran = subprocess.run(
@@ -58,6 +60,25 @@ def run_block(language: str, text: str, folder: Path) -> None:
     said = [line for line in ran.stderr.splitlines() if not line.endswith("cells were never put to the test")]
     told = [line for line in said if not (folder / line).exists()]
     assert (ran.returncode, told) == (0, []), text
+    return ran.stdout
+
+
+@pytest.mark.path
+def test_the_first_example_has_a_number_that_the_change_which_the_page_names_makes_better(tmp_path):
+    """A part of a round before the first breach as it stands; counted rounds after the change."""
+    page = README.partition("## A controller of your own")[2].partition("\n## ")[0]
+    (code,) = [text for language, text in runnable(page) if language == "python"]
+    (before,) = re.findall(r"breaks a rule after ([\d.]+) rounds on average", page)
+    (after, old) = re.findall(r"Write `([^`]+)` in the place of `([^`]+)`", page)[0]
+    assert code.count(old) == 1
+    (counted,) = re.findall(r"same two trials have (\w+) counted rounds", page)
+    found = []
+    for name, own in (("homing", code), ("mine", code.replace(old, after))):
+        (tmp_path / f"{name}.py").write_text(own)
+        words = f"dubins-traffic run town --controller {name}.py:Homing --trials 2"
+        found += tables(run_block("sh", words, tmp_path))
+    assert found[0].before == float(before) > 0
+    assert found[1].counted == ["no", "one", "two", "three", "four", "five"].index(counted)
 
 
 def test_all_code_runs(tmp_path):
@@ -65,8 +86,12 @@ def test_all_code_runs(tmp_path):
     ran = [*runnable(README), *runnable(TOUR)]
     assert len(ran) >= 12
     assert sum(MANY in text for _, text in ran) == 1
+    found = []
     for language, text in ran:
-        run_block(language, text if ALL else text.replace(MANY, "--trials 100"), tmp_path)
+        out = run_block(language, text if ALL else text.replace(MANY, "--trials 100"), tmp_path)
+        if (language, text) in runnable(README):
+            found += tables(out)
+    require_progress(found)
     made = {path.suffix for path in tmp_path.rglob("*")}
     assert {".mcap", ".png", ".svg", ".pdf", ".html", ".csv", ".json", ".rnd"} <= made
 

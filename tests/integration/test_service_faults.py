@@ -17,7 +17,7 @@ import httpx
 import pytest
 from sqlalchemy import select
 
-from dubins_traffic.service.tables import Chunk, Submission
+from dubins_traffic.service.database_tables import Chunk, Submission
 from tests import postgres
 from tests.seasons import (
     FAULTS,

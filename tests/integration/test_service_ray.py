@@ -13,7 +13,7 @@ from sqlalchemy import func, select
 
 from dubins_traffic.cli.main import main
 from dubins_traffic.service.client import TOKEN
-from dubins_traffic.service.tables import Chunk
+from dubins_traffic.service.database_tables import Chunk
 from tests import ray_cluster
 from tests.seasons import FAULTS, SETTINGS, counted_once, database_of, launched, season
 from tests.services import STANDING, shown_secret, wait_until

@@ -19,9 +19,9 @@ from sqlalchemy import select
 from dubins_traffic.competition.sealing import make_key_file
 from dubins_traffic.errors import InputError
 from dubins_traffic.service import viewing
+from dubins_traffic.service.database_tables import Phase, Submission, Trial
 from dubins_traffic.service.hiding import HiddenError
 from dubins_traffic.service.service import Service as StoredService
-from dubins_traffic.service.tables import Phase, Submission, Trial
 from tests import postgres
 from tests.services import CRASHING, Person, competition_text, serving, wait_until
 

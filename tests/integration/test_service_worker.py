@@ -15,7 +15,7 @@ from sqlalchemy import select
 from dubins_traffic.service import worker as room
 from dubins_traffic.service.client import Connection
 from dubins_traffic.service.database import Database
-from dubins_traffic.service.tables import Chunk, Trial
+from dubins_traffic.service.database_tables import Chunk, Trial
 from tests.services import STANDING, competition_text, serving, shown_secret
 
 TRIALS = 3

@@ -10,7 +10,7 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.cli.main import main
 from dubins_traffic.engine.group import Group
 from dubins_traffic.falsification.sampling import prepared
-from dubins_traffic.falsification.splitting import HASTE, Watched, beginner, coming
+from dubins_traffic.falsification.splitting import HASTE, MeasuredGroup, beginner, coming
 from dubins_traffic.problem.draw import draw_many
 from tests.falsifying import corridor
 from tests.minute import a_minute
@@ -71,7 +71,7 @@ def test_a_level_is_never_above_the_margin_and_below_it_only_for_a_collision() -
     own = prepared(a_minute("junction"), 4.0, {})
     instances = list(draw_many(own, 3, range(16)))
     group = Group(instances, keeps_rules=True)
-    collision, clear = Watched(group, "1.collision"), Watched(group, "3.clear")
+    collision, clear = MeasuredGroup(group, "1.collision"), MeasuredGroup(group, "3.clear")
     lower = 0
     for _ in range(12):
         collision.advance(10)

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.integration.test_readme import FILE_NAME, ROOT, runnable
+from tests.shown_scores import Shown, require_progress, tables
 
 TUTORIALS = ROOT / "docs" / "tutorials"
 RUN = ("synthesis", "learning")
@@ -31,6 +32,7 @@ def text(name: str) -> str:
 
 def follow(name: str, folder: Path, around: Mapping[str, str] = ENVIRONMENT) -> None:
     """Do what a tutorial says, and see that the pages which it names are there."""
+    found: list[Shown] = []
     for language, code in runnable(text(name)):
         if named := FILE_NAME.match(code):
             (folder / named[1]).write_text(code)
@@ -46,6 +48,8 @@ def follow(name: str, folder: Path, around: Mapping[str, str] = ENVIRONMENT) -> 
             timeout=1200,
         )
         assert ran.returncode == 0, f"{code}\n{ran.stdout}{ran.stderr}"
+        found += tables(ran.stdout)
+    require_progress(found)
     shown = re.findall(r"`((?:\w+/)*\w+\.html)`", text(name))
     assert [page for page in shown if not (folder / page).exists()] == []
 

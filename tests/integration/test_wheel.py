@@ -25,6 +25,8 @@ def test_a_wheel_holds_machine_code_and_says_for_which_machines(machine, tmp_pat
     assert wheel.name.endswith("-py3-none-manylinux_2_17_x86_64.whl" if machine else "-py3-none-any.whl")
     held = {name for name in ZipFile(wheel).namelist() if name.startswith("dubins_traffic/machine/")}
     assert held == {f"dubins_traffic/machine/x86-64-v2{end}" for end in (".json", "-1.so") if machine}
+    norm = ZipFile(wheel).read("dubins_traffic/rules/rules.md")
+    assert norm == (ROOT / "docs" / "rules.md").read_bytes(), "`explain` prints it"
     (metadata,) = (name for name in ZipFile(wheel).namelist() if name.endswith("/METADATA"))
     plain = [
         line for line in ZipFile(wheel).read(metadata).decode().splitlines()

@@ -9,11 +9,11 @@ import pytest
 
 from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.queues import WHO, Scene
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.solver import Solution, solve
 from tests.game_reference import Arrays, Reference
 
@@ -71,8 +71,8 @@ def solved(segments: Any, others: int, assumed: dict[str, Any]) -> Solution:
     words["forfeits"] = Forfeits(words.get("forfeits", "never"))
     words["leaves"] = Leaving(words.get("leaves", "owed"))
     words["arrives"] = Arriving(words.get("arrives", "owed"))
-    arena = Arena.of(network, goals(network)[: words.pop("goals", 2)], degree)
-    return solve(build(Board(arena, Assumption(**words), others)))
+    road_cells = RoadCells.of(network, goals(network)[: words.pop("goals", 2)], degree)
+    return solve(build(Board(road_cells, Assumption(**words), others)))
 
 
 def goals(network: RoadNetwork) -> list[int]:
@@ -89,9 +89,9 @@ def reference(segments: Any, others: int, assumed: dict[str, Any]) -> Reference:
 def position(board: Board, game: Reference, state: Any) -> int:
     """Return the number of a labelled state."""
     cells, orders, renewed = state
-    network = board.arena.network
+    network = board.road_cells.network
     scenes: list[Scene] = []
-    for node in board.arena.nodes:
+    for node in board.road_cells.nodes:
         point = network.intersections[node.vertex]
         starts = [network.intersections[network.lane_ends(lane)[0]] for lane in node.inbound]
         inside: int | None = None

@@ -19,8 +19,9 @@ from dubins_traffic.cars.state import Contact
 from dubins_traffic.errors import InputError
 from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.rules.explained import RULE_WORDS
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, assumption_of
-from dubins_traffic.viewer.marks import RULES, Mark, goal_numbers, goal_visits, marks_of, verdict_text
+from dubins_traffic.viewer.marks import Mark, goal_numbers, goal_visits, marks_of, verdict_text
 from dubins_traffic.viewer.replay import replay_page, write_replay
 from tests.synthetic import ROUGH, driven, instance, obstacles_beside, verdict
 
@@ -174,8 +175,8 @@ def test_a_verdict_is_told_in_words(breaches: list[tuple[float, str, str]], word
 
 
 def test_every_rule_has_words() -> None:
-    assert set(EGO_RULES) <= set(RULES)
-    assert {assumption_of(rule) for rule in RULES} == set(ASSUMPTIONS)
+    assert set(EGO_RULES) <= set(RULE_WORDS)
+    assert {assumption_of(rule) for rule in RULE_WORDS} == set(ASSUMPTIONS)
 
 
 def test_goals_are_numbered_in_their_order_and_once() -> None:

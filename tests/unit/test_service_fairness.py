@@ -12,10 +12,10 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database_tables import Account, Chunk, Phase, Submission, Trial
 from dubins_traffic.service.hiding import NOTHING
 from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import RefusedError, Upload
-from dubins_traffic.service.tables import Account, Chunk, Phase, Submission, Trial
 from tests.services import competition_text
 
 NOW = 2_000_000_000.0
@@ -50,7 +50,7 @@ def joined(service: Service, name: str = "Ann", team: str = "Ants") -> Account:
 def handed(
     session: Session, service: Service, account: Account, name: str, phase: str = "test"
 ) -> Submission:
-    row = receiving.found_phase(session, "short", phase)
+    row = receiving.phase_named(session, "short", phase)
     upload = Upload(accounts.digest_of(name), name, 1)
     return submissions.receive(session, row, QUOTA, account, upload, service.clock())[0]
 
@@ -138,7 +138,7 @@ def test_what_is_refused_fills_no_disk(service: Service) -> None:
     with pytest.raises(RefusedError, match="3 of 3 submissions today"):
         send("4")
     with service.database.writing() as session:
-        receiving.found_phase(session, "short", "test").closes = NOW - 1.0
+        receiving.phase_named(session, "short", "test").closes = NOW - 1.0
     with pytest.raises(RefusedError, match="closed"):
         send("5")
     assert kept() == 3
@@ -149,7 +149,7 @@ def test_a_team_sends_so_many_bytes_an_hour(service: Service) -> None:
     """What is rejected costs no quota, yet it lies in the store."""
     ann = joined(service)
     with service.database.writing() as session:
-        row = receiving.found_phase(session, "short", "practice")
+        row = receiving.phase_named(session, "short", "practice")
         for name in ("a", "b"):
             big = Upload(accounts.digest_of(name), name, submissions.MOST_BYTES // 2)
             submission, _ = submissions.receive(session, row, Quota(), ann, big, NOW)
@@ -225,9 +225,9 @@ def test_a_secret_phase_shows_no_time_at_which_something_happened(service: Servi
         checked(session, submission)
         for at in (NOW + 100.0, NOW + 200.0):
             submissions.enter(submission, "running", at)
-            seen.append(viewing.told_submission(service, session, submission, ann, {}))
+            seen.append(viewing.submission_document(service, session, submission, ann, {}))
         open_phase = handed(session, service, ann, "y", "practice")
-        assert viewing.told_submission(service, session, open_phase, ann, {})["deadline"] is not None
+        assert viewing.submission_document(service, session, open_phase, ann, {})["deadline"] is not None
     assert seen[0] == seen[1]
 
 
@@ -271,14 +271,14 @@ def test_another_team_s_bytes_are_another_submission(service: Service) -> None:
         submissions.cancel(session, second, NOW)
         assert first.state == "received"
         with pytest.raises(receiving.UnknownError):
-            receiving.found_submission(session, first.id, bob)
+            receiving.submission_numbered(session, first.id, bob)
 
 
 def test_nothing_is_named_when_a_phase_has_closed(service: Service) -> None:
     ann = joined(service)
     with service.database.writing() as session:
         number = handed(session, service, ann, "x").id
-        phase: Phase = receiving.found_phase(session, "short", "test")
+        phase: Phase = receiving.phase_named(session, "short", "test")
         phase.closes = NOW
     with pytest.raises(RefusedError, match="closed"):
         receiving.name_it(service, ann, number)

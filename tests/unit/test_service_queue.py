@@ -15,10 +15,10 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, queue, submissions
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.database_tables import Account, Act, Chunk, Competition, Phase, Submission, Trial
 from dubins_traffic.service.hiding import NOTHING
 from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import RefusedError, Upload
-from dubins_traffic.service.tables import Account, Act, Chunk, Competition, Phase, Submission, Trial
 from tests import postgres
 
 NUMBERS = itertools.count()
@@ -49,7 +49,7 @@ def furnished(session: Session, teams: int = 3, shows: str = "all") -> tuple[Pha
     session.add(phase)
     people: list[Account] = []
     for number in range(teams):
-        team = accounts.found_team(session, f"t{number}", 1.0)
+        team = accounts.make_team(session, f"t{number}", 1.0)
         person = Account(name=f"a{number}", password="none", role="participant", team=team, created=1.0)
         session.add(person)
         people.append(person)
@@ -382,7 +382,7 @@ def test_the_tables_are_those_of_the_migrations(database: Database) -> None:
     from alembic.autogenerate import compare_metadata
     from alembic.migration import MigrationContext
 
-    from dubins_traffic.service.tables import Base
+    from dubins_traffic.service.database_tables import Base
 
     with database.engine.connect() as connection:
         assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []

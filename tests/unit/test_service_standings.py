@@ -10,8 +10,16 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.service import accounts, housekeeping, standings, viewing
+from dubins_traffic.service.database_tables import (
+    Account,
+    Chunk,
+    Competition,
+    Phase,
+    Standing,
+    Submission,
+    Trial,
+)
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Account, Chunk, Competition, Phase, Standing, Submission, Trial
 
 NOW = 5000.0
 
@@ -28,7 +36,7 @@ def phase_with(session: Session, *states: str) -> tuple[Phase, list[Submission]]
     """Add a closed test phase, and submissions of one team in these states, each with two trials."""
     competition = Competition(slug="c", title="C", document="{}", created=0.0)
     phase = Phase(name="test", shows="nothing", opens=0.0, closes=4000.0, competition=competition)
-    team = accounts.found_team(session, "t", 0.0)
+    team = accounts.make_team(session, "t", 0.0)
     account = Account(name="a", password="none", role="participant", team=team, created=0.0)
     session.add_all([phase, account])
     session.flush()

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.service.service import load_settings, own_secret
+from dubins_traffic.service.service import load_settings, secret_in
 from dubins_traffic.service.storage import Storage, StorageError
 
 
@@ -38,6 +38,6 @@ def test_settings_say_what_is_wrong(tmp_path: Path) -> None:
 
 
 def test_a_secret_is_drawn_once_and_its_owner_s_alone(tmp_path: Path) -> None:
-    first = own_secret(tmp_path, "k")
-    assert own_secret(tmp_path, "k") == first
+    first = secret_in(tmp_path, "k")
+    assert secret_in(tmp_path, "k") == first
     assert (tmp_path / "k").stat().st_mode & 0o777 == 0o600

@@ -15,12 +15,12 @@ from experiments.play import Environment, play
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy, story_of
 from dubins_traffic.synthesis.game import build, estimate, save_game
 from dubins_traffic.synthesis.queues import WHO
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.solver import Solution, solve
 from dubins_traffic.synthesis.strategy import Strategy, StrategyError, check
 from tests.games import ALL, board, pan, solved
@@ -81,8 +81,8 @@ def test_where_each_place_is_a_crossing_no_bend_makes_a_difference() -> None:
 def test_whom_the_ego_blocks_at_a_bend_owes_nothing() -> None:
     """On the square each corner is two cells; lanes and cells of one direction follow each other."""
     some = board(2, 2, 1, ALL, 3)
-    game, arena = build(some), some.arena
-    nodes = len(arena.nodes)
+    game, road_cells = build(some), some.road_cells
+    nodes = len(road_cells.nodes)
     seen = 0
     for position in range(game.positions):
         owed = game.owed[game.owed_at[position] : game.owed_at[position + 1]].tolist()
@@ -90,17 +90,17 @@ def test_whom_the_ego_blocks_at_a_bend_owes_nothing() -> None:
         ego = int(game.ego_cell[position])
         inside = [n for n, scene in enumerate(scenes) if scene.inside == WHO.OTHER]
         waits = [
-            nodes + arena.nodes[n].inbound[0]
+            nodes + road_cells.nodes[n].inbound[0]
             for n, scene in enumerate(scenes)
             if (0, WHO.OTHER) in scene.queue
         ]
         for n in inside:
-            excused = ego == arena.opposite(n) or ego in arena.following(n)
+            excused = ego == road_cells.opposite(n) or ego in road_cells.following(n)
             assert (n in owed) is not excused
             seen += excused
         for lane in waits:
-            (node,) = arena.following(lane)
-            excused = ego in (node, arena.opposite(node), *arena.following(node))
+            (node,) = road_cells.following(lane)
+            excused = ego in (node, road_cells.opposite(node), *road_cells.following(node))
             assert (lane in owed) is not excused
             seen += excused
     assert seen == 8 * 2 + 8 * 3
@@ -209,8 +209,8 @@ def test_crowds_too_are_solved_and_the_bound_is_exact_on_the_square() -> None:
 
 
 def test_there_may_be_many_goals() -> None:
-    arena = Arena.of(RoadNetwork.grid(9, 9), range(81))
-    some = Board(arena, Assumption(), 1)
+    road_cells = RoadCells.of(RoadNetwork.grid(9, 9), range(81))
+    some = Board(road_cells, Assumption(), 1)
     assert estimate(some).moves > some.positions
 
 

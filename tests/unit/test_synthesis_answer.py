@@ -21,12 +21,12 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.files import write_document
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.synthesis.answer import answer, smallest
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy, story_of
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.instance import arena_of, cell_of, start_positions
+from dubins_traffic.synthesis.instance import cell_of, cells_of, start_positions
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Solution, solve
 from dubins_traffic.synthesis.strategy import Strategy, check
@@ -43,29 +43,30 @@ def test_bounds_of_an_ego_on_shortest_routes() -> None:
     up = Assumption.parse(["E1", "E2", "E3", "E4", "E5:moves-up"])
     bounds = {
         (rows, columns, degree): [
-            route_bound(board(rows, columns, 1, ALL, degree).arena, assumed) for assumed in (Assumption(), up)
+            route_bound(board(rows, columns, 1, ALL, degree).road_cells, assumed)
+            for assumed in (Assumption(), up)
         ]
         for rows, columns, degree in ((2, 2, 1), (3, 4, 1), (2, 2, 3), (3, 4, 3))
     }
     assert bounds == {(2, 2, 1): [9, 9], (3, 4, 1): [41, 41], (2, 2, 3): [3, 5], (3, 4, 3): [36, 42]}
     for left_out in ("E1", "E2", "E3", "E4", "E5"):
         parts = [part for part in ALL.split(",") if part != left_out]
-        assert route_bound(board(2, 2, 1).arena, Assumption.parse(parts)) == 0
-    assert route_bound(board(3, 4, 1, ALL, 4).arena, Assumption()) == 0
+        assert route_bound(board(2, 2, 1).road_cells, Assumption.parse(parts)) == 0
+    assert route_bound(board(3, 4, 1, ALL, 4).road_cells, Assumption()) == 0
     for weak in ("E1,E2,E3,E4:unmet,E5", "E1,E2,E3:forfeits,E4,E5"):
-        assert route_bound(board(3, 4, 1).arena, Assumption.parse(weak.split(","))) == 0
+        assert route_bound(board(3, 4, 1).road_cells, Assumption.parse(weak.split(","))) == 0
     once = Assumption.parse(["E1", "E2", "E3:one-forfeit", "E4", "E5"])
-    assert route_bound(board(3, 4, 1).arena, once) == 41
+    assert route_bound(board(3, 4, 1).road_cells, once) == 41
 
 
 def test_a_goal_in_a_dead_end_bears_two_or_one_if_it_is_no_crossing() -> None:
-    network = pan(1, [0]).arena.network
+    network = pan(1, [0]).road_cells.network
     dead_end = network.vertex((2, 1))
-    assert route_bound(Arena.of(network, [0, dead_end]), Assumption()) == 2
-    assert route_bound(Arena.of(network, [0, dead_end], 3), Assumption()) == 1
+    assert route_bound(RoadCells.of(network, [0, dead_end]), Assumption()) == 2
+    assert route_bound(RoadCells.of(network, [0, dead_end], 3), Assumption()) == 1
     up = Assumption.parse(["E1", "E2", "E3", "E4", "E5:moves-up"])
-    assert route_bound(Arena.of(network, [0, dead_end], 3), up) == 2
-    assert route_bound(Arena.of(network, [0, 3]), Assumption()) > 2
+    assert route_bound(RoadCells.of(network, [0, dead_end], 3), up) == 2
+    assert route_bound(RoadCells.of(network, [0, 3]), Assumption()) > 2
 
 
 def test_the_bound_holds_where_games_can_be_solved() -> None:
@@ -169,15 +170,15 @@ def test_the_smallest_strengthening() -> None:
 def test_the_starts_of_an_instance_are_positions_of_the_game() -> None:
     for trial in range(6):
         instance = draw(load_config("demo"), 3, trial)
-        arena = arena_of(instance.problem)
-        some = Board(arena, Assumption(), len(instance.e_agents))
-        cells = [cell_of(arena, instance.problem, pose) for pose in instance.starts]
+        road_cells = cells_of(instance.problem)
+        some = Board(road_cells, Assumption(), len(instance.e_agents))
+        cells = [cell_of(road_cells, instance.problem, pose) for pose in instance.starts]
         starts = start_positions(some, instance)
         assert bool(starts) is (len(set(cells)) == len(cells))
         for position in starts:
             scenes = some.scenes(position)
             lanes = {
-                len(arena.nodes) + arena.nodes[n].inbound[slot]
+                len(road_cells.nodes) + road_cells.nodes[n].inbound[slot]
                 for n, scene in enumerate(scenes)
                 for slot, _ in scene.queue
             }
@@ -313,7 +314,7 @@ def test_wins_that_are_all_vacuous_are_called_so(capsys: pytest.CaptureFixture[s
 def test_instances_without_goals_are_refused() -> None:
     network = RoadNetwork.grid(2, 2)
     with pytest.raises(InputError, match="no goals"):
-        Arena.of(network, [])
+        RoadCells.of(network, [])
 
 
 def test_what_is_said_of_an_instance() -> None:

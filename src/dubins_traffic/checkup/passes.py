@@ -19,7 +19,7 @@ from time import perf_counter, sleep
 
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.checkup.scenarios import scenarios
-from dubins_traffic.checkup.watch import Place, Waited, ended, see_off
+from dubins_traffic.checkup.watch import SharedProgress, Waited, ended, see_off
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.protocols import Closes, Controller, End
@@ -84,8 +84,6 @@ class Witness:
 
     Parameters
     ----------
-    controller : Controller
-        Who is asked.
     mark : callable
         Is told the time to begin (seconds) once the controller has started, and the tick before each answer.
     """
@@ -118,19 +116,11 @@ class Witness:
 
 
 def run_here(controller: str, number: int) -> Pass:
-    """Run the course in a process of its own, with hashes of strings that differ from pass to pass.
-
-    Parameters
-    ----------
-    controller : str
-        As for `run_trial`.
-    number : int
-        Of the pass.
-    """
+    """Run the course in a process of its own, with hashes of strings that differ from pass to pass."""
     with TemporaryDirectory() as folder:
         out, place = Path(folder) / "drives", Path(folder) / "place"
         out.touch()
-        with Place.made(place) as reached:
+        with SharedProgress.made(place) as reached:
             with _begun(controller, number, out, place) as child:
                 try:
                     lost = _await(child, out, reached)
@@ -169,7 +159,7 @@ def _begun(controller: str, number: int, out: Path, place: Path) -> Generator[su
         os.close(held)
 
 
-def _died(reached: Place, lost: str) -> Drive:
+def _died(reached: SharedProgress, lost: str) -> Drive:
     """Return the trial in which the process died."""
     begin = None if math.isnan(reached.begin) else reached.begin
     name, tick = list(scenarios())[max(0, reached.trial)], -1 if begin is None else reached.tick
@@ -177,7 +167,7 @@ def _died(reached: Place, lost: str) -> Drive:
     return Drive(name, DIED, f"{where}: {lost}", max(0, tick), begin, [], [])
 
 
-def _await(child: subprocess.Popen[bytes], out: Path, reached: Place) -> str:
+def _await(child: subprocess.Popen[bytes], out: Path, reached: SharedProgress) -> str:
     """Wait until all drives are written or the child has ended; return what went wrong.
 
     As long as trials go on, nobody is hurried; before the first, the kernels are compiled.
@@ -199,7 +189,7 @@ def _main(controller: str, out: str, place: str, parent: str) -> None:
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGTERM})
     threading.Thread(target=_end_with_parent, args=(int(parent),), daemon=True).start()
     instances = scenarios()
-    with Place.opened(Path(place)) as reached, Path(out).open("a", encoding="utf-8") as file:
+    with SharedProgress.opened(Path(place)) as reached, Path(out).open("a", encoding="utf-8") as file:
         late = _rehearse(controller, reached)
         if late is not None:
             file.write(json.dumps(asdict(late)) + "\n")
@@ -213,7 +203,7 @@ def _main(controller: str, out: str, place: str, parent: str) -> None:
             file.flush()
 
 
-def _rehearse(controller: str, reached: Place) -> Drive | None:
+def _rehearse(controller: str, reached: SharedProgress) -> Drive | None:
     """Drive a moment, so that what is compiled on a first run is not measured; return it if an answer never came.
 
     Built-in controllers take as long as they need, since compiling them may; all others have `FIRST` for an answer.

@@ -42,8 +42,8 @@ def scenarios() -> Mapping[str, Instance]:
         "e-agents": [],
     }
     made: dict[str, Instance] = {}
-    for number, (name, own) in enumerate(_SCENARIOS.items()):
-        document = {**common, **own, "rnd": {"version": 0, **own["rnd"]}}
+    for number, (name, scenario) in enumerate(_SCENARIOS.items()):
+        document = {**common, **scenario, "rnd": {"version": 0, **scenario["rnd"]}}
         document["e-agents"] = list(document["e-agents"])
         made[name] = draw(load_config(document), 1, number)
     return made

@@ -17,7 +17,7 @@ LOOK = 0.05
 _PLACE = struct.Struct("<qdq")
 
 
-class Place:
+class SharedProgress:
     """The trial, time to begin (s) and tick that a process has reached, in a file that outlives the process.
 
     Parameters

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dubins_traffic.cli import faults, options
-from dubins_traffic.errors import ClusterLostError
+from dubins_traffic.errors import ClusterLostError, shown
 
 if TYPE_CHECKING:
+    from dubins_traffic.campaign.report.write import Written
     from dubins_traffic.campaign.run_campaign import Ran
 
 RUN_EXAMPLES = options.examples(
@@ -20,6 +21,8 @@ RUN_EXAMPLES = options.examples(
 )
 
 REPORT_EXAMPLES = options.examples("campaign report gaps", "campaign report gaps -o report --worst 5")
+
+COMPARE_EXAMPLES = options.examples("campaign compare gaps-before gaps-after")
 
 REPLAY_EXAMPLES = options.examples("campaign replay gaps 17", "campaign replay gaps 17 -o trial.html")
 
@@ -134,27 +137,72 @@ def report(
     wall: Annotated[
         bool, typer.Option("--wall", help="Also what was measured on a wall clock, which does not repeat.")
     ] = False,
+    everything: Annotated[
+        bool, typer.Option("--all", help="Show all metrics, differences and worst trials here, too.")
+    ] = False,
 ) -> None:
-    """Compare the controllers of a campaign: a table here, a page with plots and replays, and CSV."""
-    from rich.console import Console
-
-    from dubins_traffic.campaign.report.write import tables, worst_lines, write_report
+    """Compare the controllers of a campaign: who is best, a page with charts and replays, tables for LaTeX, and CSV."""
+    from dubins_traffic.campaign.report.write import write_report
     from dubins_traffic.cli.progress import progress
-    from dubins_traffic.scoring.notice import assumption_notice
 
     with progress() as show:
         written = write_report(folder, output, worst=worst, wall=wall, progress=show, overwrite=overwrite)
+    _print(written, folder, everything=everything)
+    options.tell(str(written.page))
+
+
+def _print(written: Written, folder: str, *, everything: bool) -> None:
+    """Print a report: in at most 30 lines, or everything."""
+    from rich.console import Console
+
+    from dubins_traffic.campaign.report import terminal
+    from dubins_traffic.scoring.notice import assumption_notice
+
     console = Console(highlight=False)
-    for table in tables(written.comparison):
-        console.print(table)
-        console.print()
+    for part in terminal.short_tables(written.comparison):
+        console.print(part, markup=False, soft_wrap=isinstance(part, str))
+    if everything:
+        for table in terminal.tables(written.comparison):
+            console.print()
+            console.print(table)
     if any(written.worst.values()):
-        print("worst trials, each with the command that replays it")
-        print(*worst_lines(written.worst, folder), sep="\n", end="\n\n")
+        print()
+        if everything:
+            print("worst trials, each with the command that replays it")
+            print(*terminal.worst_lines(written.worst, folder), sep="\n")
+        else:
+            print(*terminal.short_worst(written.worst, folder), sep="\n")
     notice = assumption_notice(written.comparison.broken, written.comparison.judged)
     if notice:
-        print(notice, end="\n\n")
-    options.tell(str(written.page))
+        print(f"\n{notice}")
+    print()
+
+
+@campaign.command("compare", epilog=COMPARE_EXAMPLES)
+def compare(
+    first: Annotated[str, typer.Argument(metavar="A", help="Folder of a campaign.", show_default=False)],
+    second: Annotated[str, typer.Argument(metavar="B", help="Folder of another one.", show_default=False)],
+    everything: Annotated[
+        bool, typer.Option("--all", help="Show metrics that are 0 in both campaigns, too.")
+    ] = False,
+) -> None:
+    """Compare two campaigns: controllers of the same name, or if there is none, the best of each.
+
+    Trials on the same instance are paired, and the rest is left out. If no two are, all are compared, unpaired.
+    """
+    from rich.console import Console
+
+    from dubins_traffic.campaign.report.across import compare_campaigns, table
+
+    compared, note = compare_campaigns(first, second)
+    console = Console(highlight=False)
+    print(f"A: {shown(first)}\nB: {shown(second)}")
+    for one in compared:
+        console.print()
+        for part in table(one, everything=everything):
+            console.print(part, markup=False, soft_wrap=isinstance(part, str))
+    if note:
+        faults.tell(note)
 
 
 @campaign.command("replay", epilog=REPLAY_EXAMPLES)

@@ -9,6 +9,7 @@ import typer
 
 from dubins_traffic.cli import faults, options
 from dubins_traffic.errors import shown
+from dubins_traffic.rules.clauses import explain
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -85,6 +86,8 @@ def _show(record: str, ending: Ending | None, score: Score) -> None:
         console.print(f"  {shown(found.name)}: {verdict_text(found)}", markup=False)
     if verdict is not None and verdict.violations:
         console.print(_breaches(verdict))
+        first = verdict.violations[0].rule if verdict.excuse is None else verdict.excuse.assumption
+        console.print(f"  what a rule says: {explain(first)}", markup=False)
 
 
 def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
@@ -102,8 +105,7 @@ def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
         sensed = "within" if excuse.sensed else "beyond"
         first = f"{excuse.violation.car} broke {excuse.violation.rule} at {excuse.violation.time:.3f} s"
         near = "before each breach" if verdict.near else "not before every breach"
-        part = f"{excuse.assumption} ({excuse.clause})"
-        console.print(f"  excused by {part}: {first}, {sensed} the sensing radius", markup=False)
+        console.print(f"  excused by {excuse.assumption}: {first}, {sensed} the sensing radius", markup=False)
         console.print(f"  {near} of the ego, a car near it had just broken a rule", markup=False)
     from dubins_traffic.scoring.margins import UNITS
 
@@ -114,15 +116,15 @@ def _show_verdict(record: str, verdict: Verdict, console: Console) -> None:
 
 
 def _breaches(verdict: Verdict) -> Table:
-    """Return the breaches as a table; `clause` is where the rule is stated."""
+    """Return the breaches as a table."""
     from rich import box
     from rich.table import Table
 
     table = Table(box=box.SIMPLE_HEAD, padding=0, show_edge=False)
-    for heading in ("time", "since", "car", "rule", "x", "y", "clause"):
-        left = heading in ("car", "rule", "clause")
+    for heading in ("time", "since", "car", "rule", "x", "y"):
+        left = heading in ("car", "rule")
         table.add_column(heading, justify="left" if left else "right", no_wrap=True)
     for entry in verdict.violations:
         x, y = f"{entry.where.x:.2f}", f"{entry.where.y:.2f}"
-        table.add_row(f"{entry.time:.3f}", f"{entry.since:.3f}", entry.car, entry.rule, x, y, entry.clause)
+        table.add_row(f"{entry.time:.3f}", f"{entry.since:.3f}", entry.car, entry.rule, x, y)
     return table

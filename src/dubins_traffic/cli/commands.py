@@ -16,6 +16,7 @@ from dubins_traffic.cli import (
     convert,
     estimate,
     evaluate,
+    explain,
     falsify,
     faults,
     gazebo,
@@ -86,6 +87,7 @@ app.command("play", epilog=play.EXAMPLES)(play.play)
 app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
 app.command("score", epilog=score.EXAMPLES)(score.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)
+app.command("explain", epilog=explain.EXAMPLES)(explain.explain)
 app.command("verify", epilog=verify.EXAMPLES)(verify.verify)
 app.command("check-controller", epilog=check_controller.EXAMPLES)(check_controller.check_controller)
 app.command("spec", epilog=spec.EXAMPLES)(spec.spec)

@@ -14,7 +14,7 @@ from dubins_traffic.errors import InputError, shown
 
 if TYPE_CHECKING:
     from dubins_traffic.competition.competition import Phase
-    from dubins_traffic.competition.ranking import Place
+    from dubins_traffic.competition.ranking import RankedEntry
 
 NEW_EXAMPLES = options.examples("competition new spring")
 CHECK_EXAMPLES = options.examples("competition check spring")
@@ -215,7 +215,7 @@ def _phase_line(phase: Phase) -> str:
     return "; ".join(parts)
 
 
-def _show(places: list[Place], phase: Phase) -> None:
+def _show(places: list[RankedEntry], phase: Phase) -> None:
     from rich.console import Console
     from rich.table import Table
 

@@ -62,7 +62,7 @@ def convert(
 ) -> None:
     """Convert a road network (its suffix says to which map format) or a record (to `.csv`, `.parquet` or `.bag`).
 
-    Of the map of another program only what a network can hold is converted, and what was lost is told (docs/maps.md).
+    Of the map of another program only what a network can hold is converted, and what was lost is told.
 
     A road network also becomes a world for Gazebo (`.sdf`); an instance or a record one with its obstacles and cars.
     A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`), each further trial of it another one (`-1.mcap`,

@@ -39,9 +39,7 @@ RulesOption = Annotated[
 ]  # fmt: skip
 FormulaOption = Annotated[
     str | None,
-    typer.Option(
-        "--formula", metavar="F", help="A formula of your own that is asked for instead (docs/task.md)."
-    ),
+    typer.Option("--formula", metavar="F", help="A formula of your own that is asked for instead."),
 ]
 LeastOption = Annotated[
     bool, typer.Option("--least-score", help="Look for the trials of the least score instead.")

@@ -96,7 +96,7 @@ def network(
     output: options.Output = None,
     overwrite: options.Replace = False,
 ) -> None:
-    """Print a road network: a grid, one drawn at random, or what can be held of a map (docs/maps.md)."""
+    """Print a road network: a grid, one drawn at random, or what can be held of a map."""
     from dubins_traffic.files import packed
     from dubins_traffic.roads.generate import generate
     from dubins_traffic.roads.network import RoadNetwork

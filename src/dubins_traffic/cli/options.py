@@ -86,7 +86,7 @@ Sandbox = Annotated[
     bool,
     typer.Option(
         "--sandbox",
-        help="Run the controller in a box (docs/sandbox.md); none of its code is loaded here.",
+        help="Run the controller in a box; none of its code is loaded here.",
     ),
 ]
 Limits = Annotated[

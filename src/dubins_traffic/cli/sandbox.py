@@ -16,12 +16,12 @@ if TYPE_CHECKING:
 
 CHECK_EXAMPLES = options.examples("sandbox check", "sandbox check --json", "sandbox check --no-attacks")
 
-app = typer.Typer(help="Boxes in which strangers' controllers drive (docs/sandbox.md).", no_args_is_help=True)
+app = typer.Typer(help="Boxes in which strangers' controllers drive.", no_args_is_help=True)
 
 
 @app.callback()
 def about() -> None:
-    """Boxes in which strangers' controllers drive (docs/sandbox.md)."""
+    """Boxes in which strangers' controllers drive."""
 
 
 @app.command("check", epilog=CHECK_EXAMPLES)

@@ -280,7 +280,7 @@ def compare(
     from dubins_traffic.suites.writing import PAGE, TABLE, results, write_results
 
     sources = open_sources(places)
-    first = sources[0].found.suite
+    first = sources[0].results.suite
     if name is None and first not in shipped_suites():
         file, expected = str(sources[0].path), "its file, by --suite"
         raise InputError("results of a suite that is not shipped", file=file, value=first, expected=expected)
@@ -290,5 +290,5 @@ def compare(
     else:
         print(write_results(found, sources, Path(output), overwrite=overwrite), end="")
         options.tell(str(Path(output) / PAGE))
-    if len({source.found.code for source in sources}) > 1:
+    if len({source.results.code for source in sources}) > 1:
         faults.tell(made_by(sources))

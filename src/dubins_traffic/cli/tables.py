@@ -26,8 +26,9 @@ Scores: TypeAlias = "Sequence[Score]"
 WIDTH = 80
 """Columns of a terminal into which a table fits, unless told otherwise."""
 NOTE = (
-    "Controllers are ranked by counted rounds, which are the rounds of clean trials.\n"
-    "ICRA 2016 is the score of that competition, and ranks nothing (docs/scores.md)."
+    "The best controller has the most counted rounds. A round is complete when every\n"
+    "goal has been visited, and counts if the ego broke no rule in the whole trial.\n"
+    "The columns paper and ICRA 2016 are scores of 2016; they rank nothing."
 )
 """What stands below a table."""
 
@@ -76,8 +77,8 @@ def yes(value: bool) -> str:
 
 
 def points(value: float | None) -> str:
-    """Return a score by a formula: six digits that count."""
-    return "not defined" if value is None else f"{value:g}"
+    """Return a score by a formula, six digits that count; a dash where the formula does not apply."""
+    return "-" if value is None else f"{value:g}"
 
 
 def _clean(score: Score) -> str:

@@ -192,26 +192,18 @@ class Phase:
 
     Trial number n is trial ``n % trials`` of configuration ``n // trials``, drawn from a seed of its own where
     the seeds are secret, else from the one seed of the phase.
-
-    Attributes
-    ----------
-    name : str
-        Such as ``test``.
-    model : PhaseModel
-        What the file says of it.
-    configurations : tuple of Named
-        Those of its trials.
-    ranking : Ranking
-        What ranks its entries.
-    folder : Path or None
-        Where sealed and revealed seeds lie; None for a competition that is no file.
     """
 
     name: str
+    """Such as ``test``."""
     model: PhaseModel
+    """What the file says of it."""
     configurations: tuple[Named, ...]
+    """Those of its trials."""
     ranking: Ranking
+    """What ranks its entries."""
     folder: Path | None = None
+    """Where sealed and revealed seeds lie; None for a competition that is no file."""
 
     @property
     def opens(self) -> datetime | None:
@@ -254,7 +246,8 @@ class Phase:
         return digest(
             {
                 "configurations": [
-                    {"name": own.name, "document": own.configuration.inlined()} for own in self.configurations
+                    {"name": named.name, "document": named.configuration.inlined()}
+                    for named in self.configurations
                 ],
                 "trials": self.model.trials,
                 "limits": self.model.limits.model_dump(),
@@ -316,27 +309,18 @@ class Phase:
 
 @dataclass(frozen=True, slots=True)
 class Competition:
-    """A checked competition.
-
-    Attributes
-    ----------
-    document : Mapping
-        What the file says, with the configurations and their road networks written in; JSON.
-    model : CompetitionModel
-        The same, checked, with defaults.
-    configurations : tuple of Named
-        All of them.
-    file : str or None
-        Where it was read; named in messages.
-    folder : Path or None
-        Where sealed and revealed seeds lie: the folder of the file.
-    """
+    """A checked competition."""
 
     document: Mapping[str, Any]
+    """What the file says, with the configurations and their road networks written in; JSON."""
     model: CompetitionModel
+    """The same, checked, with defaults."""
     configurations: tuple[Named, ...]
+    """All of them."""
     file: str | None = field(default=None, compare=False)
+    """Where it was read; named in messages."""
     folder: Path | None = field(default=None, compare=False)
+    """Where sealed and revealed seeds lie: the folder of the file."""
 
     @staticmethod
     def from_document(
@@ -349,15 +333,15 @@ class Competition:
         InputError
             For the first thing wrong, with its field.
         """
-        own = plain(_dated(document), file)
-        model = parse(CompetitionModel, own, file=file)
+        plain_document = plain(_dated(document), file)
+        model = parse(CompetitionModel, plain_document, file=file)
         try:
             check_names([entry.name for entry in model.configurations], "configurations")
-            found = tuple(
+            configurations = tuple(
                 Named(entry.name, configuration_of(entry, k, folder))
                 for k, entry in enumerate(model.configurations)
             )
-            made = Competition(_complete(own, found), model, found, file, folder)
+            made = Competition(_complete(plain_document, configurations), model, configurations, file, folder)
             for name in model.phases:
                 _check_phase(made.phase(name))
         except InputError as error:
@@ -393,7 +377,7 @@ class Competition:
         if model is None:
             expected = f"one of {', '.join(self.model.phases)}"
             raise InputError("no such phase", file=self.file, field="phases", value=name, expected=expected)
-        known = {own.name: own for own in self.configurations}
+        known = {named.name: named for named in self.configurations}
         for k, wanted in enumerate(model.configurations or ()):
             if wanted not in known:
                 raise InputError(
@@ -436,7 +420,7 @@ def _dated(value: object) -> Any:
 
 
 def _complete(document: dict[str, Any], configurations: tuple[Named, ...]) -> dict[str, Any]:
-    entries = [{"name": own.name, "document": own.configuration.inlined()} for own in configurations]
+    entries = [{"name": named.name, "document": named.configuration.inlined()} for named in configurations]
     return {**document, "configurations": entries}
 
 
@@ -449,13 +433,13 @@ def _check_phase(phase: Phase) -> None:
             value=len(phase.numbers),
             expected=f"at most {MOST_TRIALS} in all",
         )
-    check_names([own.name for own in phase.configurations], f"{where}.configurations")
+    check_names([named.name for named in phase.configurations], f"{where}.configurations")
     if phase.ranking.metric == "icra2016":
-        for own in phase.configurations:
-            if weight_of(draw(own.configuration)) is None:
+        for named in phase.configurations:
+            if weight_of(draw(named.configuration)) is None:
                 raise InputError(
                     "the score of ICRA 2016 is not defined here",
                     field="ranking.metric",
-                    value=own.name,
+                    value=named.name,
                     expected="configurations on a grid, whose e-agents are called agent...",
                 )

@@ -58,36 +58,24 @@ _NUMBERS: Final = ("counted_rounds", SECOND, "icra2016", "collisions", "clean")
 
 
 class Judged(Strict):
-    """What came of one trial of a submission, as a value and as a JSON object.
-
-    Attributes
-    ----------
-    number : int
-        Of the trial in its phase.
-    row : dict
-        The score by columns (`scoring.columns.SCORES`), with ``number``, ``end`` and ``reason``: what ranking reads.
-    end : str
-        Why the trial ended: a named end, or ``failed`` if it could not be run.
-    owner : str or None
-        Whose fault the end was: ``submission``, ``platform``, or nobody's.
-    log : str
-        The tail of what the submission has printed.
-    frames : str or None
-        SHA-256 of all frames (`FramesHash`); None if it could not be run.
-    ran : str or None
-        Where the submission ran (`controllers.registry.ran`): boxed, or trusted with the limits that the machine has.
-    recorded : bytes or None
-        The record, if it was to be remembered; it is no part of the JSON object.
-    """
+    """What came of one trial of a submission, as a value and as a JSON object."""
 
     number: int
+    """Of the trial in its phase."""
     row: dict[str, Any]
+    """The score by columns (`scoring.columns.SCORES`), with ``number``, ``end`` and ``reason``: what ranking reads."""
     end: str
+    """Why the trial ended: a named end, or ``failed`` if it could not be run."""
     owner: Owner | None
+    """Whose fault the end was: ``submission``, ``platform``, or nobody's."""
     log: str
+    """The tail of what the submission has printed."""
     frames: str | None
+    """SHA-256 of all frames (`FramesHash`); None if it could not be run."""
     ran: str | None = None
+    """Where the submission ran (`controllers.registry.ran`): boxed, or trusted with the limits that the machine has."""
     recorded: bytes | None = Field(default=None, exclude=True, repr=False)
+    """The record, if it was to be remembered; it is no part of the JSON object."""
 
     @property
     def counts(self) -> bool:
@@ -101,12 +89,12 @@ class Judged(Strict):
     @staticmethod
     def from_json(document: object, file: str | None = None) -> Judged:
         """Return what `to_json` gave; InputError if it is anything else."""
-        found = parse(Judged, document, file=file)
+        judged = parse(Judged, document, file=file)
         try:
-            found._check_row()
+            judged._check_row()
         except InputError as error:
             raise error.within(file=file) from None
-        return found
+        return judged
 
     def _check_row(self) -> None:
         """Refuse a row of another trial, or one that ranking can't read."""
@@ -141,12 +129,8 @@ def judge(
 
     Parameters
     ----------
-    phase : Phase
-        Of a competition.
     numbers : iterable of int
         Which of its trials.
-    submission : Submission
-        Who drives.
     seeds : Mapping, optional
         The seeds by number; left out: those of the phase, which must be known then.
     trust : bool
@@ -200,17 +184,17 @@ def _judged(
         return _failed(number, str(error))
     row = rows.row(number, result.ending, result.score, {})
     end = result.ending.end.value
-    own = {name: _plain(row[name]) for name in rows.RESULT}
+    kept_row = {name: _plain(row[name]) for name in rows.RESULT}
     return Judged(
-        number=number, row=own, end=end, owner=OWNERS.get(end), log=seat.log_tail, frames=digest.result(),
+        number=number, row=kept_row, end=end, owner=OWNERS.get(end), log=seat.log_tail, frames=digest.result(),
         ran=registry.ran(name), recorded=recorded.getvalue() or None,
     )  # fmt: skip
 
 
 def _failed(number: int, reason: str) -> Judged:
     row = rows.failure(number, rows.FAILED, reason)
-    own = {name: row[name] for name in rows.RESULT}
-    return Judged(number=number, row=own, end=rows.FAILED, owner="platform", log="", frames=None)
+    kept_row = {name: row[name] for name in rows.RESULT}
+    return Judged(number=number, row=kept_row, end=rows.FAILED, owner="platform", log="", frames=None)
 
 
 def _plain(value: object) -> Any:
@@ -226,7 +210,7 @@ def _make(folder: Path) -> None:
 
 
 ARRAYS: Final = tuple(
-    own.name for own in fields(Frames) if own.name not in ("first", "rate", "contacts", "events")
+    array.name for array in fields(Frames) if array.name not in ("first", "rate", "contacts", "events")
 )
 """The arrays of a block of frames, (F, N)."""
 
@@ -245,9 +229,9 @@ class FramesHash:
 
     def frames(self, frames: Frames) -> None:
         """Take a block of frames."""
-        for name, found in self._arrays.items():
+        for name, digest in self._arrays.items():
             array = getattr(frames, name)
-            found.update(np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<")).tobytes())
+            digest.update(np.ascontiguousarray(array, dtype=array.dtype.newbyteorder("<")).tobytes())
         for contact in frames.contacts:
             self._contacts.update(_packed(contact))
 
@@ -256,7 +240,7 @@ class FramesHash:
 
     def result(self) -> str:
         """Return the SHA-256 of all frames so far, as hexadecimal digits."""
-        lines = [self._head, *(f"{name} {found.hexdigest()}" for name, found in self._arrays.items())]
+        lines = [self._head, *(f"{name} {digest.hexdigest()}" for name, digest in self._arrays.items())]
         lines.append(f"contacts {self._contacts.hexdigest()}")
         return hashlib.sha256("\n".join(lines).encode()).hexdigest()
 
@@ -282,7 +266,7 @@ class Evaluation:
 
     def to_json(self) -> dict[str, Any]:
         """Return the evaluation as a JSON object."""
-        return {**self.head, "trials": [own.to_json() for own in self.results]}
+        return {**self.head, "trials": [result.to_json() for result in self.results]}
 
     @property
     def head(self) -> dict[str, Any]:
@@ -306,14 +290,10 @@ def evaluate(
     ----------
     phase : Phase
         Of a competition; its seeds must be known.
-    submission : Submission
-        Who drives.
     folder : Path
         What comes of each trial is kept here as soon as it is known; made if missing.
     workers : int
         Processes; the results are the same with any number.
-    trust : bool
-        As for `judge`.
     records : bool
         Whether records are kept, in ``folder/records``.
     progress : callable, optional
@@ -330,18 +310,20 @@ def evaluate(
     _make_results(folder)
     with locked(folder):
         known = _begun(phase, submission, folder)
-        found = {own.number: own for own in known.results if own.counts}
-        left = [number for number in phase.numbers if number not in found]
+        by_number = {result.number: result for result in known.results if result.counts}
+        left = [number for number in phase.numbers if number not in by_number]
         work = _Work(phase, submission, seeds, trust, folder / "records" if records else None)
         if progress is not None:
-            progress(len(found), len(phase.numbers))
+            progress(len(by_number), len(phase.numbers))
         with contextlib.closing(_run(work, left, workers)) as results:
-            for own in results:
-                found[own.number] = own
-                _append(folder / RESULTS, _line(own.to_json()))
+            for judged in results:
+                by_number[judged.number] = judged
+                _append(folder / RESULTS, _line(judged.to_json()))
                 if progress is not None:
-                    progress(len(found), len(phase.numbers))
-        done = Evaluation(phase.name, phase.rules, submission.digest, tuple(found[k] for k in sorted(found)))
+                    progress(len(by_number), len(phase.numbers))
+        done = Evaluation(
+            phase.name, phase.rules, submission.digest, tuple(by_number[k] for k in sorted(by_number))
+        )
         _write(done, folder)
     return done
 
@@ -363,17 +345,17 @@ def load_evaluation(place: Path) -> Evaluation:
         raise InputError(
             "not results", file=str(path), value=head, expected="version, phase, rules, submission"
         )
-    found: dict[int, Judged] = {}
+    by_number: dict[int, Judged] = {}
     for k, line in enumerate(lines[1:], 2):
-        own = Judged.from_json(_json(line, path, k), f"{path}: line {k}")
-        found[own.number] = own
-    results = tuple(found[number] for number in sorted(found))
+        judged = Judged.from_json(_json(line, path, k), f"{path}: line {k}")
+        by_number[judged.number] = judged
+    results = tuple(by_number[number] for number in sorted(by_number))
     return Evaluation(head["phase"], head["rules"], head["submission"], results)
 
 
 def kept(folder: Path) -> int:
     """Return how many trials an evaluation has results of."""
-    return sum(own.counts for own in load_evaluation(folder).results)
+    return sum(result.counts for result in load_evaluation(folder).results)
 
 
 def load_entries(places: Sequence[str], phase: Phase) -> dict[str, tuple[Judged, ...]]:
@@ -391,22 +373,22 @@ def load_entries(places: Sequence[str], phase: Phase) -> dict[str, tuple[Judged,
     InputError
         If one holds no results, those of another phase or of other rules, or a name stands twice.
     """
-    found: dict[str, tuple[Judged, ...]] = {}
+    results_of: dict[str, tuple[Judged, ...]] = {}
     for text in places:
         name, equals, place = text.rpartition("=")
         name = name if equals else Path(place).resolve().name
-        own = load_evaluation(Path(place))
-        if (own.phase, own.rules) != (phase.name, phase.rules):
+        evaluation = load_evaluation(Path(place))
+        if (evaluation.phase, evaluation.rules) != (phase.name, phase.rules):
             raise InputError(
                 "results of another phase, or under other rules",
                 file=place,
-                value=own.phase,
+                value=evaluation.phase,
                 expected=phase.name,
             )
-        if name in found:
+        if name in results_of:
             raise InputError("name taken", file=place, value=name, expected="NAME=DIR, each name once")
-        found[name] = own.results
-    return found
+        results_of[name] = evaluation.results
+    return results_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -420,10 +402,10 @@ class _Work:
     def judged(self, number: int) -> Judged:
         """Return what comes of one trial."""
         seeds = {number: self.seeds[number]}
-        (found,) = judge(
+        (judged_trial,) = judge(
             self.phase, [number], self.submission, seeds=seeds, trust=self.trust, records=self.records
         )
-        return found
+        return judged_trial
 
 
 @dataclass(frozen=True, slots=True)
@@ -448,13 +430,13 @@ def _run(work: _Work, numbers: Sequence[int], workers: int) -> Generator[Judged]
         return
     errands = map(partial(_Errand, work=pickle.dumps(work)), numbers)
     with contextlib.closing(Processes(min(workers, len(numbers)))) as crew:
-        for errand, found in carry_out(crew, errands):
-            if found is None:
+        for errand, judged in carry_out(crew, errands):
+            if judged is None:
                 raise WorkerLostError(
                     f"the process ended in the middle of trial {errand.number}, each time it was run; the same command "
                     "goes on"
                 )
-            yield found
+            yield judged
 
 
 def _begun(phase: Phase, submission: Submission, folder: Path) -> Evaluation:
@@ -462,22 +444,22 @@ def _begun(phase: Phase, submission: Submission, folder: Path) -> Evaluation:
     path = folder / RESULTS
     made = Evaluation(phase.name, phase.rules, submission.digest, ())
     if path.is_file() and path.stat().st_size:
-        found = load_evaluation(path)
-        if found.head != made.head:
+        before = load_evaluation(path)
+        if before.head != made.head:
             raise InputError(
                 "holds another evaluation",
                 file=str(folder),
-                value=f"{found.phase} of {found.submission[:12]}",
+                value=f"{before.phase} of {before.submission[:12]}",
                 expected="a new folder, or that of the same submission, phase and rules",
             )
-        made = found
+        made = before
     _write(made, folder)
     return made
 
 
-def _write(found: Evaluation, folder: Path) -> None:
+def _write(evaluation: Evaluation, folder: Path) -> None:
     """Write the results in the order of their numbers: the same bytes whatever the order in which they came."""
-    text = _line(found.head) + "".join(_line(own.to_json()) for own in found.results)
+    text = _line(evaluation.head) + "".join(_line(result.to_json()) for result in evaluation.results)
     replace_file(folder / RESULTS, lambda neighbour: neighbour.write_text(text, encoding="utf-8"))
 
 
@@ -499,12 +481,12 @@ def _line(document: dict[str, Any]) -> str:
 
 def _json(line: str, path: Path, number: int) -> dict[str, Any]:
     try:
-        found: object = json.loads(line)
+        document: object = json.loads(line)
     except (ValueError, RecursionError) as error:
         raise InputError(f"line {number} is not JSON ({error})", file=str(path)) from None
-    if not isinstance(found, dict):
+    if not isinstance(document, dict):
         raise InputError(f"line {number} is not a JSON object", file=str(path))
-    return cast("dict[str, Any]", found)
+    return cast("dict[str, Any]", document)
 
 
 def _is_head(head: dict[str, Any]) -> bool:

@@ -28,41 +28,32 @@ PLATFORM: Final = frozenset(end for end, owner in OWNERS.items() if owner == "pl
 
 
 @dataclass(frozen=True, slots=True)
-class Place:
-    """The place of one entry.
-
-    Attributes
-    ----------
-    place : int
-        From 1; entries that nothing parts share one, and the next is as much lower.
-    entry : str
-        Whose it is.
-    trials : int
-        How many trials it rests on.
-    estimate : Estimate
-        Mean of the metric over the trials, with its 95 % interval.
-    second : float
-        Mean of the rounds before the first breach, which parts entries of equal means.
-    satisfied, clean : Share
-        Of the trials, with Wilson's intervals: satisfied to the end; nothing broken, of those that were not cut.
-    cut : int
-        Trials that others ended before the ego broke anything (docs/rules.md#cut); they count as all do in `estimate`.
-    ties : tuple of str
-        The other entries from which it can't be told: the interval of the paired differences holds 0.
-    to_next : Estimate or None
-        By how much it exceeds the next lower place, trial by trial; None for the lowest.
-    """
+class RankedEntry:
+    """The place of one entry."""
 
     place: int
+    """From 1; entries that nothing parts share one, and the next is as much lower."""
     entry: str
+    """Whose it is."""
     trials: int
+    """How many trials it rests on."""
     estimate: Estimate
+    """Mean of the metric over the trials, with its 95 % interval."""
     second: float
+    """Mean of the rounds before the first breach, which parts entries of equal means."""
     satisfied: Share
     clean: Share
+    """`satisfied`, `clean`: of the trials, with Wilson's intervals: satisfied to the end; nothing broken, of those
+    that were not cut.
+    """
     cut: int
+    """Trials that others ended before the ego broke anything (docs/rules.md#cut); they count as all do in
+    `estimate`.
+    """
     ties: tuple[str, ...]
+    """The other entries from which it can't be told: the interval of the paired differences holds 0."""
     to_next: Estimate | None
+    """By how much it exceeds the next lower place, trial by trial; None for the lowest."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the place as a JSON object."""
@@ -94,19 +85,17 @@ class _Entry:
     cut: int
 
 
-def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
+def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[RankedEntry]:
     """Rank entries by what they did in the same trials.
 
     Parameters
     ----------
     entries : Mapping
         What came of all trials of the phase for each entry, in any order.
-    phase : Phase
-        Whose ranking.
 
     Returns
     -------
-    list of Place
+    list of RankedEntry
         Best first; entries on one place in the order of their names.
 
     Raises
@@ -114,32 +103,32 @@ def rank(entries: Mapping[str, Sequence[Result]], phase: Phase) -> list[Place]:
     InputError
         If an entry lacks a trial, has one twice, or one that ended by a fault of the platform and must run again.
     """
-    found = sorted(
+    ranked = sorted(
         (_entry(name, results, phase) for name, results in sorted(entries.items())),
-        key=lambda own: _merit(own, phase),
+        key=lambda entry: _merit(entry, phase),
         reverse=True,
     )
-    apart = {(one.first, one.second): one for one in _differences(found, phase)}
-    places: list[Place] = []
-    for k, own in enumerate(found):
-        equal = k > 0 and _merit(own, phase) == _merit(found[k - 1], phase)
+    apart = {(one.first, one.second): one for one in _differences(ranked, phase)}
+    places: list[RankedEntry] = []
+    for k, entry in enumerate(ranked):
+        equal = k > 0 and _merit(entry, phase) == _merit(ranked[k - 1], phase)
         beside = [
-            (one.second if one.first == own.name else one.first)
+            (one.second if one.first == entry.name else one.first)
             for one in apart.values()
-            if own.name in (one.first, one.second) and holds_zero(one.estimate)
+            if entry.name in (one.first, one.second) and holds_zero(one.estimate)
         ]
-        following = apart[own.name, found[k + 1].name].estimate if k + 1 < len(found) else None
-        count = len(own.values)
+        following = apart[entry.name, ranked[k + 1].name].estimate if k + 1 < len(ranked) else None
+        count = len(entry.values)
         places.append(
-            Place(
+            RankedEntry(
                 places[-1].place if equal else k + 1,
-                own.name,
+                entry.name,
                 count,
-                _estimated(own.values.tobytes()),
-                own.second,
-                share(own.satisfied, count),
-                share(own.clean, count - own.cut),
-                own.cut,
+                _estimated(entry.values.tobytes()),
+                entry.second,
+                share(entry.satisfied, count),
+                share(entry.clean, count - entry.cut),
+                entry.cut,
                 tuple(sorted(beside)),
                 following,
             )
@@ -160,14 +149,14 @@ def ranking_document(entries: Mapping[str, Sequence[Result]], phase: Phase) -> d
         "places": [place.to_json() for place in rank(entries, phase)],
         "differences": [
             {
-                "first": own.first,
-                "second": own.second,
-                "mean": own.estimate.mean,
-                "interval": _ends(own.estimate.mean_interval),
-                "first_larger": own.larger,
-                "first_smaller": own.smaller,
+                "first": difference.first,
+                "second": difference.second,
+                "mean": difference.estimate.mean,
+                "interval": _ends(difference.estimate.mean_interval),
+                "first_larger": difference.larger,
+                "first_smaller": difference.smaller,
             }
-            for own in differences(entries, phase)
+            for difference in differences(entries, phase)
         ],
     }
 
@@ -183,10 +172,10 @@ def value(row: Mapping[str, Any], metric: str) -> float:
 
     Norm: docs/rules.md#ranking.
     """
-    found = row[metric]
-    if metric == "icra2016" and (found is None or row["end"] != End.DURATION):
+    score = row[metric]
+    if metric == "icra2016" and (score is None or row["end"] != End.DURATION):
         return COLLISION_SCORE
-    return 0.0 if found is None else float(found)
+    return 0.0 if score is None else float(score)
 
 
 def is_satisfied(row: Mapping[str, Any]) -> bool:
@@ -205,17 +194,17 @@ def is_cut(row: Mapping[str, Any]) -> bool:
     return was_cut(row["verdict"], row["clean"], row["end"])
 
 
-def holds_zero(found: Estimate) -> bool:
+def holds_zero(difference: Estimate) -> bool:
     """Tell whether differences are none that could be told from nothing; one difference alone tells nothing."""
     return (
-        found.count < 2
-        or found.mean_interval is None
-        or found.mean_interval[0] <= 0.0 <= found.mean_interval[1]
+        difference.count < 2
+        or difference.mean_interval is None
+        or difference.mean_interval[0] <= 0.0 <= difference.mean_interval[1]
     )
 
 
 def _entry(name: str, results: Sequence[Result], phase: Phase) -> _Entry:
-    rows = sorted((_row(own) for own in results), key=lambda row: row["number"])
+    rows = sorted((_row(result) for result in results), key=lambda row: row["number"])
     numbers = [row["number"] for row in rows]
     left = missing(results, phase)
     if left or numbers != list(phase.numbers):
@@ -228,19 +217,19 @@ def _entry(name: str, results: Sequence[Result], phase: Phase) -> _Entry:
     values = np.array([value(row, phase.ranking.metric) for row in rows], dtype=np.float64)
     mean = float(np.sum(values)) / len(values)
     second = math.fsum(value(row, SECOND) for row in rows) / len(rows)
-    counts = (sum(map(told, rows)) for told in (is_satisfied, is_clean, is_cut))
+    counts = (sum(map(holds, rows)) for holds in (is_satisfied, is_clean, is_cut))
     return _Entry(name, values, mean, second, *counts)
 
 
-def _merit(own: _Entry, phase: Phase) -> tuple[float, float, int]:
-    second = own.second if phase.ranking.metric == "counted_rounds" else 0.0
-    return own.mean, second, own.satisfied if phase.ranking.ties == "satisfied" else 0
+def _merit(entry: _Entry, phase: Phase) -> tuple[float, float, int]:
+    second = entry.second if phase.ranking.metric == "counted_rounds" else 0.0
+    return entry.mean, second, entry.satisfied if phase.ranking.ties == "satisfied" else 0
 
 
-def _differences(found: Sequence[_Entry], phase: Phase) -> list[Difference]:
+def _differences(entries: Sequence[_Entry], phase: Phase) -> list[Difference]:
     column = SCORES[phase.ranking.metric].column
     made: list[Difference] = []
-    for one, other in combinations(found, 2):
+    for one, other in combinations(entries, 2):
         apart = one.values - other.values
         larger, smaller = int((apart > 0).sum()), int((apart < 0).sum())
         made.append(Difference(one.name, other.name, column, _estimated(apart.tobytes()), larger, smaller))

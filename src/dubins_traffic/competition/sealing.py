@@ -82,24 +82,16 @@ class Seeded(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Seeds:
-    """The seeds of a phase with what hides them until they are revealed.
-
-    Attributes
-    ----------
-    phase : str
-        Its name.
-    rules : str
-        `Phase.rules` when the seeds were drawn.
-    salt : str
-        32 random bytes as hexadecimal digits: nobody can try seeds against the commitment.
-    seeds : tuple of int
-        One a trial, in the order of their numbers.
-    """
+    """The seeds of a phase with what hides them until they are revealed."""
 
     phase: str
+    """Its name."""
     rules: str
+    """`Phase.rules` when the seeds were drawn."""
     salt: str
+    """32 random bytes as hexadecimal digits: nobody can try seeds against the commitment."""
     seeds: tuple[int, ...]
+    """One a trial, in the order of their numbers."""
 
     @property
     def text(self) -> str:
@@ -120,20 +112,20 @@ def read_seeds(text: str, file: str | None = None) -> Seeds:
     if len(lines) < 6 or lines[0] != HEADING or lines[-1]:
         raise InputError("not revealed seeds", file=file, expected=expected)
     pairs = [line.partition(" ") for line in lines[1:4]]
-    found = {name: value for name, _, value in pairs}
-    if list(found) != ["phase", "rules", "salt"]:
+    head = {name: value for name, _, value in pairs}
+    if list(head) != ["phase", "rules", "salt"]:
         raise InputError("not revealed seeds", file=file, value=lines[1:4], expected=expected)
     for name, rule in (("rules", _DIGEST), ("salt", _SALT)):
-        if not rule.fullmatch(found[name]):
+        if not rule.fullmatch(head[name]):
             raise InputError(
-                "wrong value", file=file, field=name, value=found[name], expected="64 hexadecimal digits"
+                "wrong value", file=file, field=name, value=head[name], expected="64 hexadecimal digits"
             )
     for k, line in enumerate(lines[4:-1]):
         if not _SEED.fullmatch(line) or int(line) >= limits.SEEDS:
             raise InputError(
                 "not a seed", file=file, field=f"line {k + 5}", value=line, expected="an integer below 2**64"
             )
-    return Seeds(found["phase"], found["rules"], found["salt"], tuple(map(int, lines[4:-1])))
+    return Seeds(head["phase"], head["rules"], head["salt"], tuple(map(int, lines[4:-1])))
 
 
 def check_belong(seeds: Seeds, phase: Seeded, file: str | None = None) -> None:
@@ -262,7 +254,7 @@ def seal(phase: Seeded, key: bytes, seeds: Seeds | None = None, *, overwrite: bo
     salt, nonce = secrets.token_bytes(16), secrets.token_bytes(12)
     head = {"version": 1, "phase": phase.name, "commitment": seeds.commitment}
     hidden = cipher_of(key, salt).encrypt(nonce, seeds.text.encode(), _bound(head))
-    texts = {name: _text(own) for name, own in (("salt", salt), ("nonce", nonce), ("sealed", hidden))}
+    texts = {name: _text(data) for name, data in (("salt", salt), ("nonce", nonce), ("sealed", hidden))}
     _write(path, dumps(Sealed.model_validate({**head, **texts}).model_dump()))
     return seeds.commitment
 
@@ -278,10 +270,10 @@ def unsealed(phase: Seeded, key: bytes) -> Seeds:
         Without the extra `competition`.
     """
     path = sealed_path(phase)
-    found = _sealed(phase)
-    head = {"version": 1, "phase": found.phase, "commitment": found.commitment}
-    cipher = cipher_of(key, _bytes(found.salt, path))
-    nonce, hidden = _bytes(found.nonce, path), _bytes(found.sealed, path)
+    sealed_seeds = _sealed(phase)
+    head = {"version": 1, "phase": sealed_seeds.phase, "commitment": sealed_seeds.commitment}
+    cipher = cipher_of(key, _bytes(sealed_seeds.salt, path))
+    nonce, hidden = _bytes(sealed_seeds.nonce, path), _bytes(sealed_seeds.sealed, path)
     from cryptography.exceptions import InvalidTag
 
     try:
@@ -291,7 +283,7 @@ def unsealed(phase: Seeded, key: bytes) -> Seeds:
             "can't be decrypted: another passphrase or key, or the file has been changed", file=str(path)
         ) from None
     seeds = read_seeds(text, str(path))
-    if seeds.commitment != found.commitment:
+    if seeds.commitment != sealed_seeds.commitment:
         raise InputError("the seeds are not those committed to", file=str(path), field="commitment")
     check_belong(seeds, phase, str(path))
     return seeds
@@ -300,24 +292,21 @@ def unsealed(phase: Seeded, key: bytes) -> Seeds:
 def publish(phase: Seeded, title: str, now: datetime | None = None) -> Published:
     """Write the commitment of a phase for everybody to see, and return it; a second time it is the same.
 
-    Raises
-    ------
-    InputError
-        If the seeds have not been sealed, another commitment has been published, or it can't be written.
+    InputError if the seeds have not been sealed, another commitment has been published, or it can't be written.
     """
     sealed = _sealed(phase)
     path = commitment_path(phase)
     if is_file(path):
-        found = read_published(path)
-        if found.commitment != sealed.commitment:
+        published_before = read_published(path)
+        if published_before.commitment != sealed.commitment:
             raise InputError(
                 "another commitment has been published",
                 file=str(path),
                 field="commitment",
-                value=found.commitment,
+                value=published_before.commitment,
                 expected=sealed.commitment,
             )
-        return found
+        return published_before
     made = Published(
         version=1,
         title=title,
@@ -398,12 +387,12 @@ def _sealed(phase: Seeded) -> Sealed:
             file=str(path),
             expected="the file that `dubins-traffic competition seal` makes",
         )
-    found = parse(Sealed, parse_json(read_text(path), str(path)), file=str(path))
-    if found.phase != phase.name:
+    sealed = parse(Sealed, parse_json(read_text(path), str(path)), file=str(path))
+    if sealed.phase != phase.name:
         raise InputError(
-            "seeds of another phase", file=str(path), field="phase", value=found.phase, expected=phase.name
+            "seeds of another phase", file=str(path), field="phase", value=sealed.phase, expected=phase.name
         )
-    return found
+    return sealed
 
 
 def _check_secret(phase: Seeded) -> None:

@@ -54,20 +54,20 @@ def folder_files(folder: Path, bounds: Bounds) -> dict[str, bytes]:
 
     InputError if there is something that is no file or folder, can't be read, or is too much.
     """
-    found: dict[str, bytes] = {}
+    data_of: dict[str, bytes] = {}
     left = bounds.total
     try:
         for path in _walk(folder):
             name = path.relative_to(folder).as_posix()
-            _check_count(len(found) + 1, bounds)
-            found[_checked_name(name)] = data = _read(path, left, bounds)
+            _check_count(len(data_of) + 1, bounds)
+            data_of[_checked_name(name)] = data = _read(path, left, bounds)
             left -= len(data)
     except OSError as error:
         raise InputError(
             f"can't be read ({error.strerror})", file=os.fspath(error.filename or folder)
         ) from None
-    _check_names(found)
-    return found
+    _check_names(data_of)
+    return data_of
 
 
 def check_apart(folder: Path, results: Path) -> None:
@@ -75,8 +75,8 @@ def check_apart(folder: Path, results: Path) -> None:
 
     InputError if `results` lies in `folder` and would be read as a part of it.
     """
-    own, place = folder.resolve(), results.resolve()
-    if folder.is_dir() and place.is_relative_to(own) and _is_kept(place.relative_to(own).as_posix()):
+    whole, place = folder.resolve(), results.resolve()
+    if folder.is_dir() and place.is_relative_to(whole) and _is_kept(place.relative_to(whole).as_posix()):
         raise InputError(
             "lies in what is evaluated",
             file=str(results),
@@ -104,12 +104,12 @@ def zip_files(data: bytes, bounds: Bounds) -> dict[str, bytes]:
                 raise InputError(
                     "unpacks to too much", value=declared, expected=f"at most {bounds.total >> 20} MiB"
                 )
-            found: dict[str, bytes] = {}
+            data_of: dict[str, bytes] = {}
             for entry in entries:
-                if entry.filename in found:
+                if entry.filename in data_of:
                     raise InputError("name taken", field=entry.filename, expected="each file once")
                 with archive.open(entry) as file:
-                    found[entry.filename] = file.read(entry.file_size)
+                    data_of[entry.filename] = file.read(entry.file_size)
     except (
         zipfile.BadZipFile,
         zlib.error,
@@ -121,8 +121,8 @@ def zip_files(data: bytes, bounds: Bounds) -> dict[str, bytes]:
         OSError,
     ) as error:
         raise InputError(f"a damaged archive ({error})", expected="a zip archive") from None
-    _check_names(found)
-    return found
+    _check_names(data_of)
+    return data_of
 
 
 def without_folder(files: dict[str, bytes], wanted: frozenset[str]) -> dict[str, bytes]:
@@ -135,7 +135,7 @@ def without_folder(files: dict[str, bytes], wanted: frozenset[str]) -> dict[str,
 
 def _walk(folder: Path) -> Iterator[Path]:
     with os.scandir(folder) as entries:
-        for entry in sorted(entries, key=lambda own: own.name):
+        for entry in sorted(entries, key=lambda item: item.name):
             if not _is_kept(entry.name):
                 continue
             kind = entry.stat(follow_symlinks=False).st_mode
@@ -262,22 +262,16 @@ class Manifest(Strict):
 
 @dataclass(frozen=True, slots=True)
 class Submission:
-    """A checked and stored submission.
-
-    Attributes
-    ----------
-    digest : str
-        SHA-256 over a line ``SHA-256  name`` for each file, sorted by name. Dates and permissions do not count.
-    kind : str
-        ``python``: a class that our shim drives; ``program``: anything else, which speaks lines; ``image``: a container
-        image with such a program.
-    path : Path
-        The folder in which it is stored.
-    """
+    """A checked and stored submission."""
 
     digest: str
+    """SHA-256 over a line ``SHA-256 name`` for each file, sorted by name. Dates and permissions do not count."""
     kind: Kind
+    """``python``: a class that our shim drives; ``program``: anything else, which speaks lines; ``image``: a
+    container image with such a program.
+    """
     path: Path
+    """The folder in which it is stored."""
 
 
 def check_submission(
@@ -420,7 +414,7 @@ def _store(files: dict[str, bytes], program: str | None, path: Path) -> None:
                     file.flush()
                     os.fsync(file.fileno())
                 place.chmod(0o755 if name == program else 0o644)
-            for folder in (new, *(own for own in new.rglob("*") if own.is_dir())):
+            for folder in (new, *(item for item in new.rglob("*") if item.is_dir())):
                 folder.chmod(0o755)
             try:
                 new.rename(path)

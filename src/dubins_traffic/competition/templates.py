@@ -30,7 +30,7 @@ def write_template(kind: str, folder: Path) -> list[Path]:
 
     InputError if there is no such template, the folder holds something, or it can't be written.
     """
-    found = template_files(kind)
+    texts = template_files(kind)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         held = sorted(path.name for path in folder.iterdir())
@@ -40,9 +40,9 @@ def write_template(kind: str, folder: Path) -> list[Path]:
         ) from None
     if held:
         raise InputError(f"holds {held[0]}", file=str(folder), expected="a new or empty folder")
-    for name, text in found.items():
+    for name, text in texts.items():
         write_text(folder / name, text)
-    return [folder / name for name in found]
+    return [folder / name for name in texts]
 
 
 def _texts(folder: Traversable) -> Iterator[tuple[str, str]]:

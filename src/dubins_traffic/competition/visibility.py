@@ -36,27 +36,18 @@ _BEFORE_TRIALS = ("rejected", "cancelled")
 
 @dataclass(frozen=True, slots=True)
 class SubmissionState:
-    """Where a submission is.
-
-    Attributes
-    ----------
-    state : str
-        One of `State`.
-    reason : str
-        Why it is there, for people.
-    owner : str or None
-        Whose fault that is: ``submission``, ``platform``, or nobody's.
-    received : str or None
-        When it was received, UTC, ISO 8601.
-    place : int or None
-        Its place in the queue, from 1.
-    """
+    """Where a submission is."""
 
     state: State
+    """One of `State`."""
     reason: str = ""
+    """Why it is there, for people."""
     owner: Literal["submission", "platform"] | None = None
+    """Whose fault that is: ``submission``, ``platform``, or nobody's."""
     received: str | None = None
+    """When it was received, UTC, ISO 8601."""
     place: int | None = None
+    """Its place in the queue, from 1."""
 
 
 def visible(
@@ -66,8 +57,6 @@ def visible(
 
     Parameters
     ----------
-    phase : Phase
-        In which it was handed in.
     state : SubmissionState
         Where it is.
     results : sequence of Judged
@@ -83,16 +72,16 @@ def visible(
     shows = "all" if phase.is_closed(now) else phase.shows
     if shows == "nothing":
         return _hidden(phase, state, results)
-    told: dict[str, Any] = {**_head(phase, state), "state": state.state, "reason": state.reason}
-    told |= {"owner": state.owner, "place": state.place}
+    document: dict[str, Any] = {**_head(phase, state), "state": state.state, "reason": state.reason}
+    document |= {"owner": state.owner, "place": state.place}
     if shows == "aggregates":
-        return {**told, **_aggregates(phase, state, results)}
+        return {**document, **_aggregates(phase, state, results)}
     return {
-        **told,
+        **document,
         "done": len(results),
         "of": len(phase.numbers),
         "summary": summary(phase, results),
-        "trials": [own.to_json() for own in sorted(results, key=lambda own: own.number)],
+        "trials": [result.to_json() for result in sorted(results, key=lambda result: result.number)],
     }
 
 
@@ -108,7 +97,7 @@ def _head(phase: Phase, state: SubmissionState) -> dict[str, Any]:
 
 def _hidden(phase: Phase, state: SubmissionState, results: Sequence[Judged]) -> dict[str, Any]:
     """Return what may be seen of a submission whose trials are secret."""
-    ours = state.owner == "platform" or any(own.owner == "platform" for own in results)
+    ours = state.owner == "platform" or any(result.owner == "platform" for result in results)
     before = state.state in _BEFORE_TRIALS
     return {
         **_head(phase, state),
@@ -121,31 +110,31 @@ def _hidden(phase: Phase, state: SubmissionState, results: Sequence[Judged]) -> 
 
 def _aggregates(phase: Phase, state: SubmissionState, results: Sequence[Judged]) -> dict[str, Any]:
     """Return rounded aggregates over all trials, if they are done and enough, and a tail of one log."""
-    told: dict[str, Any] = {"done": len(results), "of": len(phase.numbers), "summary": None}
+    document: dict[str, Any] = {"done": len(results), "of": len(phase.numbers), "summary": None}
     if state.state == "failed" and state.owner == "platform":
-        told["reason"] = OUR_FAULT
+        document["reason"] = OUR_FAULT
     enough = len(phase.numbers) >= phase.model.least_trials
     if state.state == "done" and enough and not missing(results, phase):
-        told["summary"] = summary(phase, results, phase.model.digits)
-    ordered = sorted(results, key=lambda own: own.number)
-    at_fault = [own for own in ordered if own.owner == "submission"]
-    told["faults"] = sorted({own.end for own in at_fault})
+        document["summary"] = summary(phase, results, phase.model.digits)
+    ordered = sorted(results, key=lambda result: result.number)
+    at_fault = [result for result in ordered if result.owner == "submission"]
+    document["faults"] = sorted({result.end for result in at_fault})
     shown = (at_fault or ordered[-1:])[:1]
-    told["log"] = tail(shown[0].log, phase.model.log_lines) if shown else ""
-    return told
+    document["log"] = tail(shown[0].log, phase.model.log_lines) if shown else ""
+    return document
 
 
 def summary(phase: Phase, results: Sequence[Judged], digits: int | None = None) -> dict[str, Any] | None:
     """Return how many trials count, and means over them, rounded to `digits`; None if none counts."""
-    rows = [own.row for own in results if own.counts]
+    rows = [result.row for result in results if result.counts]
     if not rows:
         return None
     metric = phase.ranking.metric
-    found = {
+    figures = {
         metric: sum(value(row, metric) for row in rows) / len(rows),
         SECOND: sum(value(row, SECOND) for row in rows) / len(rows),
         "satisfied": sum(map(is_satisfied, rows)) / len(rows),
         "clean": sum(map(is_clean, rows)) / max(1, len(rows) - sum(map(is_cut, rows))),
     }
-    told = {name: own if digits is None else round(own, digits) for name, own in found.items()}
-    return {"trials": len(rows), **told}
+    rounded = {name: number if digits is None else round(number, digits) for name, number in figures.items()}
+    return {"trials": len(rows), **rounded}

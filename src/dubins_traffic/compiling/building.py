@@ -23,24 +23,16 @@ Progress = Callable[[int, int], object]
 
 
 class Built(NamedTuple):
-    """What has been built.
-
-    Attributes
-    ----------
-    library : Path or None
-        The library; None if each kernel is in a file of its own, which llvmlite loads.
-    reason : str
-        Why there is no library.
-    kernels : int
-        Number of kernels.
-    failed : list of str
-        What could not be compiled, and why.
-    """
+    """What has been built."""
 
     library: Path | None
+    """The library; None if each kernel is in a file of its own, which llvmlite loads."""
     reason: str
+    """Why there is no library."""
     kernels: int
+    """Number of kernels."""
     failed: list[str]
+    """What could not be compiled, and why."""
 
 
 def build(folder: Path | None = None, progress: Progress | None = None) -> Built:
@@ -70,7 +62,7 @@ def build(folder: Path | None = None, progress: Progress | None = None) -> Built
     where, reason = _checked_folder(folder), _hindrance()
     if reason and folder is not None:
         raise InputError(reason, file="--folder", value=str(folder), expected="none here")
-    files = {own.kernel.key(own.kinds): _file_of(own) for own in entries()}
+    files = {entry.kernel.key(entry.kinds): _file_of(entry) for entry in entries()}
     failed = _compiled(progress)
     if failed or reason:
         return Built(None, reason, len(files), failed)
@@ -90,10 +82,10 @@ def _hindrance() -> str:
 
 def entries() -> list[Entry]:
     """Return all kernels of the package that Python calls, with the kinds of their arguments."""
-    with listed() as found:
+    with listed() as compiled:
         for run in moments():
             run()
-    return [own for own in found if own.kernel.__module__.startswith(OURS)]
+    return [entry for entry in compiled if entry.kernel.__module__.startswith(OURS)]
 
 
 def _checked_folder(folder: Path | None) -> Path:
@@ -129,13 +121,13 @@ def _compiled(progress: Progress | None) -> list[str]:
     done, whole = -1, len(_waiting)
     try:
         while done < whole:
-            now = sum(own.is_there() or bool(own.failure) or own.wish.path.exists() for own in _waiting)
+            now = sum(one.is_there() or bool(one.failure) or one.wish.path.exists() for one in _waiting)
             if now != done and progress is not None:
                 progress(now, whole)
             done = now
             if done < whole:
                 sleep(PAUSE)
-        return [f"{own.wish.name}: {own.failure.splitlines()[-1]}" for own in _waiting if own.failure]
+        return [f"{one.wish.name}: {one.failure.splitlines()[-1]}" for one in _waiting if one.failure]
     except BaseException:
         beside.end()
         raise

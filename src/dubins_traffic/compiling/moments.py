@@ -171,9 +171,9 @@ def _bend() -> None:
 
 def _game(instance: Instance, assumed: Sequence[str] | None) -> None:
     """Solve a game, keep its strategy if it is won, and drive by it."""
-    found = answer(instance, assumption=None if assumed is None else Assumption.parse(assumed))
-    scene_numbers(found.solution.game.board)
-    strategy = Strategy.of(found.solution)
+    answered = answer(instance, assumption=None if assumed is None else Assumption.parse(assumed))
+    scene_numbers(answered.solution.game.board)
+    strategy = Strategy.of(answered.solution)
     with contextlib.suppress(InputError), TemporaryDirectory() as folder:
         strategy.save(kept := Path(folder) / "strategy.npz")
         Strategy.load(kept)

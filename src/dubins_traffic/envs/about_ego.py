@@ -30,8 +30,8 @@ def count_cars(rows: Ints, tick: int, outlook: OutlookTables, steps: StepTables)
 
 
 @jit
-def tell_cars(rows: Ints, cars: int, told: Flats, outlook: OutlookTables, steps: StepTables) -> None:
-    """Write what the cars of some `rows` (K,) observe, and into `told` (V, T) what they are told of the ego.
+def tell_cars(rows: Ints, cars: int, facts: Flats, outlook: OutlookTables, steps: StepTables) -> None:
+    """Write what the cars of some `rows` (K,) observe, and into `facts` (V, T) what they are told of the ego.
 
     `cars` (count) is how many rows a trial has; its first row is the ego's.
     """
@@ -39,24 +39,24 @@ def tell_cars(rows: Ints, cars: int, told: Flats, outlook: OutlookTables, steps:
         row: int = rows[k]
         write_flat(row, EGO, steps.flat[row], outlook)
         number = row % cars
-        _tell(row, row - number, 0 if number == 0 else 1, told[row], outlook, steps)
+        _tell(row, row - number, 0 if number == 0 else 1, facts[row], outlook, steps)
 
 
 @jit
 def _tell(row: int, first: int, place: int, out: Flats, outlook: OutlookTables, steps: StepTables) -> None:
     """Write what the car of a row is told of the ego, which stands in a place of it, and in the row `first`."""
-    state, own, ego = outlook.state, outlook.trial[row], outlook.trial[first]
+    state, car, ego = outlook.state, outlook.trial[row], outlook.trial[first]
     x, y, c, s = state.x[row, EGO], state.y[row, EGO], state.c[row, EGO], state.s[row, EGO]
     ec, es = state.c[row, place], state.s[row, place]
     out[0] = 1.0 if row == first else 0.0
-    write_bearing(state.x[row, place] - x, state.y[row, place] - y, c, s, own.sight, out[1:4])
+    write_bearing(state.x[row, place] - x, state.y[row, place] - y, c, s, car.sight, out[1:4])
     out[4] = within(c * ec + s * es)
     out[5] = within(c * es - s * ec)
-    out[6] = within(state.speed[row, place] / own.speed)
-    out[7] = within(state.yaw_rate[row, place] / own.yaw_rate)
+    out[6] = within(state.speed[row, place] / car.speed)
+    out[7] = within(state.yaw_rate[row, place] / car.yaw_rate)
     out[8] = out[9] = out[10] = out[11] = 0.0
     if ego.target >= 0:
         vertex: int = outlook.roads.vert_off[ego.net] + outlook.goal[ego.target].vertex
         goal = outlook.roads.vertex[vertex]
-        write_bearing(goal.x - x, goal.y - y, c, s, own.sight, out[8:11])
-        out[11] = near_far(steps.stride[first].route, own.sight)
+        write_bearing(goal.x - x, goal.y - y, c, s, car.sight, out[8:11])
+        out[11] = near_far(steps.stride[first].route, car.sight)

@@ -31,15 +31,7 @@ if TYPE_CHECKING:
 
 
 class TrialView:
-    """Shows one trial of a group as if it ran by itself.
-
-    Parameters
-    ----------
-    group : Group
-        The trials.
-    row : int
-        Which of them.
-    """
+    """Shows one trial of a group as if it ran by itself."""
 
     def __init__(self, group: Group, row: int) -> None:
         self._group, self._row = group, row
@@ -72,8 +64,6 @@ class EgoChannel:
 
     Parameters
     ----------
-    trial : TrialView
-        The trial.
     shown : int
         Other cars that a flat observation shows, at most.
     shield : {"sure", "law", "never"}, optional
@@ -163,10 +153,7 @@ class FormulaWatch:
 def with_formulas(instance: Instance, formulas: Mapping[str, str]) -> Instance:
     """Return an instance whose problem carries formulas.
 
-    Raises
-    ------
-    FormulaError
-        If one can't be read or monitored, or names what the problem lacks.
+    FormulaError if one can't be read or monitored, or names what the problem lacks.
     """
     problem = replace(instance.problem, formulas=dict(formulas))
     check_formulas(problem, instance.names)

@@ -52,8 +52,6 @@ class Blame:
 
     Parameters
     ----------
-    problem : Problem
-        What is judged.
     excuses : bool
         Whether it matters who broke first; else each side answers for all that it breaks.
 
@@ -76,14 +74,14 @@ class Blame:
 
         That is ``E1`` to ``E6`` of an e-agent's, and the rule itself of the ego's.
         """
-        found: list[tuple[Breach, str]] = []
+        counted: list[tuple[Breach, str]] = []
         for breach in sorted(breaches, key=lambda one: (one.tick, one.car == EGO, *order(one))):
             part = breach.rule if breach.car == EGO else assumption_of(breach.rule)
             if self._counts(breach, part):
-                found.append((breach, part))
+                counted.append((breach, part))
                 if self.first is None:
                     self.first, self._since = breach.car, breach.tick
-        return found
+        return counted
 
     def _counts(self, breach: Breach, part: str) -> bool:
         if breach.car == EGO:
@@ -99,43 +97,29 @@ Bools = npt.NDArray[np.bool_]
 
 
 @dataclass
-class Cast:
-    """Which cars learners drive in the trials of a crew.
-
-    Parameters
-    ----------
-    learned : sequence of int
-        Numbers of the cars that learners drive.
-    ego : str or None
-        The controller that drives the ego, by its name; None if a learner does.
-    shields : dict
-        Of cars under a shield, by number, when they may cross the centre line.
-    excuses : bool
-        Whether what one side breaks after the other costs nothing (`Blame`).
-    """
+class Roles:
+    """Which cars learners drive in the trials of a crew."""
 
     learned: Sequence[int]
+    """Numbers of the cars that learners drive."""
     ego: str | None = None
+    """The controller that drives the ego, by its name; None if a learner does."""
     shields: dict[int, Overtakes] = field(default_factory=dict[int, "Overtakes"])
+    """Of cars under a shield, by number, when they may cross the centre line."""
     excuses: bool = True
+    """Whether what one side breaks after the other costs nothing (`Blame`)."""
 
 
-class Crew:
+class MultiAgentTrials:
     """Some trials of one configuration, from their first frames on.
 
     Parameters
     ----------
     instances : sequence of Instance
         One a trial; all have as many cars.
-    cast : Cast
-        Who drives what.
-    settings : Settings
-        What the environments of the trials have in common.
 
     Attributes
     ----------
-    group : Group
-        The trials.
     terms : (B, N, T)
         Terms of `envs.terms` of each car in the last step, but for breaches.
     broken : (B, N, P)
@@ -148,14 +132,14 @@ class Crew:
         Of each trial, whose breaches count.
     """
 
-    def __init__(self, instances: Sequence[Instance], cast: Cast, settings: Settings) -> None:
-        own = [with_learners(instance, cast.learned) for instance in instances]
-        if cast.ego is None:
-            self.group = Group(own, keeps_rules=False)
+    def __init__(self, instances: Sequence[Instance], roles: Roles, settings: Settings) -> None:
+        with_roles = [with_learners(instance, roles.learned) for instance in instances]
+        if roles.ego is None:
+            self.group = Group(with_roles, keeps_rules=False)
         else:
-            egos = Egos(cast.ego, apart=True)
+            egos = Egos(roles.ego, apart=True)
             is_kernel = egos.is_compiled and not settings.disturbed
-            self.group = egos.group(own, Way.COMPILED if is_kernel else Way.ASKED)
+            self.group = egos.group(with_roles, Way.COMPILED if is_kernel else Way.ASKED)
         self._cars = len(instances[0].starts)
         trials, places = self.group.state.x.shape
         problems = [instance.problem for instance in instances]
@@ -172,23 +156,23 @@ class Crew:
         self.broken: Ints = np.zeros((trials, places, len(PARTS)), dtype=np.int64)
         self.stepped_in: Ints = np.zeros((trials, places), dtype=np.int64)
         self.given: list[Floats] = []
-        self.blame = [Blame(problem, excuses=cast.excuses) for problem in problems]
+        self.blame = [Blame(problem, excuses=roles.excuses) for problem in problems]
         self._known = [(0, 0)] * trials
-        self._learned = list(cast.learned)
-        self._shields = self._shielded(problems, cast)
+        self._learned = list(roles.learned)
+        self._shields = self._shielded(problems, roles)
         self._count, self._tell = bound(count_cars), bound(tell_cars)
         begin_trials(self.outlook, self._steps)
         self._charge(np.arange(trials, dtype=np.int64))
         self.broken[:] = 0
         self._observe(np.arange(trials, dtype=np.int64))
 
-    def _shielded(self, problems: Any, cast: Cast) -> list[CarShields]:
-        found: list[CarShields] = []
-        for overtakes in dict.fromkeys(cast.shields.values()):
+    def _shielded(self, problems: Any, roles: Roles) -> list[CarShields]:
+        shields_of_cars: list[CarShields] = []
+        for overtakes in dict.fromkeys(roles.shields.values()):
             cars: Bools = np.zeros(self.group.state.x.shape, dtype=np.bool_)
-            cars[:, [car for car, own in cast.shields.items() if own == overtakes]] = True
-            found.append(CarShields(problems, self._views, cars, overtakes=overtakes))
-        return found
+            cars[:, [car for car, shield in roles.shields.items() if shield == overtakes]] = True
+            shields_of_cars.append(CarShields(problems, self._views, cars, overtakes=overtakes))
+        return shields_of_cars
 
     def step(self, asked: Floats, ticks: int) -> None:
         """Step all trials that have not ended by up to `ticks` ticks.
@@ -197,8 +181,6 @@ class Crew:
         ----------
         asked : (B, N, 2)
             What the cars that learners drive are to do, speed, m/s, and yaw rate, rad/s.
-        ticks : int
-            For how long.
         """
         self.terms[:] = 0.0
         self.broken[:] = 0
@@ -268,9 +250,9 @@ def with_learners(instance: Instance, learned: Sequence[int]) -> Instance:
 
 def _guilty(breach: Breach, contacts: Sequence[Contact]) -> int:
     """Return the number of contacts in the tick of a collision in which the ego is at fault."""
-    own = [one for one in contacts if one.tick == breach.tick]
+    at_tick = [one for one in contacts if one.tick == breach.tick]
     return sum(
         guilty and car == EGO
-        for one in own
+        for one in at_tick
         for car, guilty in zip((one.car, one.other), one.at_fault, strict=True)
     )

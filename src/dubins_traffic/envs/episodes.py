@@ -31,21 +31,14 @@ LEVEL_DRAW: Final = 260
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """A pool of road networks that are drawn once.
-
-    Parameters
-    ----------
-    count : int
-        How many there are.
-    seed : int
-        What they are drawn from.
-    split : str
-        ``train``, or ``test`` for as many others, none of which is drawn for training.
-    """
+    """A pool of road networks that are drawn once."""
 
     count: int
+    """How many there are."""
     seed: int = 0
+    """What they are drawn from."""
     split: str = "train"
+    """``train``, or ``test`` for as many others, none of which is drawn for training."""
 
     def __post_init__(self) -> None:
         if isinstance(self.count, bool) or not 1 <= self.count < TEST:
@@ -78,8 +71,6 @@ class Episodes:
 
     Parameters
     ----------
-    configuration : Configuration
-        What they are drawn from.
     levels : Levels, optional
         The pool of road networks; by default each trial has the network that its configuration says.
     """
@@ -95,12 +86,12 @@ class Episodes:
         groups: dict[tuple[int, int], list[int]] = {}
         for place, (seed, trial) in enumerate(numbered):
             groups.setdefault((seed, self._level_of(seed, trial)), []).append(place)
-        found: dict[int, Instance] = {}
+        by_place: dict[int, Instance] = {}
         for (seed, level), places in groups.items():
-            own = self.configuration if level < 0 else self._level(level)
-            drawn = draw_many(own, seed, [numbered[place][1] for place in places])
-            found.update(zip(places, drawn, strict=True))
-        return [found[place] for place in range(len(numbered))]
+            configuration = self.configuration if level < 0 else self._level(level)
+            drawn = draw_many(configuration, seed, [numbered[place][1] for place in places])
+            by_place.update(zip(places, drawn, strict=True))
+        return [by_place[place] for place in range(len(numbered))]
 
     def _level_of(self, seed: int, trial: int) -> int:
         """Return the number of a trial's level, -1 without a pool."""
@@ -140,4 +131,4 @@ def seeds_of(seed: int | Sequence[int | None], envs: int) -> list[tuple[int, int
         raise InputError(
             "not one seed for each environment", field="seed", value=len(seed), expected=str(envs)
         )
-    return [(int(cast(int, own)), 0) for own in seed]
+    return [(int(cast(int, each)), 0) for each in seed]

@@ -13,7 +13,7 @@ from pettingzoo import ParallelEnv  # pyright: ignore[reportMissingTypeStubs]
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import Cast, Crew
+from dubins_traffic.envs.crew import MultiAgentTrials, Roles
 from dubins_traffic.envs.pictures import SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import Pay
@@ -106,8 +106,10 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         self._cars = self.settings.sample.names
         self._ids = [agent_name(car) for car in range(len(self._cars))]
         self.names = dict(zip(self._ids, self._cars, strict=True))
-        self._cast = Cast(_numbers(self.settings.sample, learned, with_ego=ego is None), ego, excuses=excuses)
-        self.possible_agents = [self._ids[car] for car in self._cast.learned]
+        self._roles = Roles(
+            _numbers(self.settings.sample, learned, with_ego=ego is None), ego, excuses=excuses
+        )
+        self.possible_agents = [self._ids[car] for car in self._roles.learned]
         self.agents: list[str] = []
         size = self.settings.layout.size + len(NAMES)
         self.observation_spaces = {
@@ -115,7 +117,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         }
         actions = self.settings.actions.space  # of which each agent has its own, seeded by itself
         self.action_spaces = {name: deepcopy(actions) for name in self.possible_agents}
-        self._crew: Crew | None = None
+        self._crew: MultiAgentTrials | None = None
         self._seed: int | None = None
         self._episode = 0
 
@@ -145,7 +147,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         for agent in agents:
             if agent not in self.possible_agents:
                 raise _no_agent("shield", agent, self.possible_agents)
-            self._cast.shields[self._ids.index(agent)] = check_overtakes(overtakes)
+            self._roles.shields[self._ids.index(agent)] = check_overtakes(overtakes)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -166,7 +168,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
                 expected=", ".join(self._cars),
             )
         self._episode += 1
-        self._crew = Crew([instance], self._cast, self.settings)
+        self._crew = MultiAgentTrials([instance], self._roles, self.settings)
         self.agents = list(self.possible_agents)
         return self._observed(), {name: {"trial": instance} for name in self.agents}
 
@@ -217,29 +219,29 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         """The commands of all cars in each tick of this episode so far, (K, N, 2), m/s and rad/s."""
         given = self._begun().given
         cars = len(self._cars)  # the tables of a batch may have more places than the trial has cars
-        return np.array([own[0, :cars] for own in given]).reshape(len(given), cars, 2)
+        return np.array([of_cars[0, :cars] for of_cars in given]).reshape(len(given), cars, 2)
 
-    def _paid(self, crew: Crew, name: str) -> tuple[float, dict[str, Any]]:
+    def _paid(self, crew: MultiAgentTrials, name: str) -> tuple[float, dict[str, Any]]:
         car = self._ids.index(name)
-        reward, told = self._pay.of(crew.terms[0], crew.broken[0], car)
+        reward, info = self._pay.of(crew.terms[0], crew.broken[0], car)
         first = crew.blame[0].first
-        told["broke_first"] = None if first is None else self._ids[first]
-        if car in self._cast.shields:
-            told["interventions"] = int(crew.stepped_in[0, car])
+        info["broke_first"] = None if first is None else self._ids[first]
+        if car in self._roles.shields:
+            info["interventions"] = int(crew.stepped_in[0, car])
         if crew.group.endings[0] is not None:
-            told["trial"] = crew.group.instances[0]
-        return reward, told
+            info["trial"] = crew.group.instances[0]
+        return reward, info
 
     def _observed(self) -> dict[str, Any]:
         whole = self._begun().observed[0]
         return {name: whole[self._ids.index(name)] for name in self.agents}
 
-    def _begun(self) -> Crew:
+    def _begun(self) -> MultiAgentTrials:
         if self._crew is None:
             raise DubinsTrafficError("an environment has to be reset before it is used")
         return self._crew
 
-    def _running(self) -> Crew:
+    def _running(self) -> MultiAgentTrials:
         crew = self._begun()
         if not self.agents:
             raise DubinsTrafficError("the episode is over: reset the environment")
@@ -262,10 +264,10 @@ def _numbers(sample: Instance, learned: Sequence[str] | None, *, with_ego: bool)
     for name in learned or ():
         if name not in names[1:]:
             raise _no_agent("learned", name, names[1:])
-    found = [EGO] if with_ego else []
+    cars = [EGO] if with_ego else []
     for car, agent in enumerate(sample.e_agents, start=1):
         if learned is None or agent.name in learned:
-            found.append(car)
+            cars.append(car)
         elif agent.kind not in KEEP_RULES:
             raise InputError(
                 "an e-agent beside learners",
@@ -273,9 +275,9 @@ def _numbers(sample: Instance, learned: Sequence[str] | None, *, with_ego: bool)
                 value=agent.kind,
                 expected=", ".join(sorted(KEEP_RULES)),
             )
-    if not found:
+    if not cars:
         raise InputError("nobody learns", field="learned", value=learned, expected="at least one car")
-    return found
+    return cars
 
 
 def _no_agent(field: str, name: str, known: Sequence[str]) -> InputError:

@@ -34,8 +34,6 @@ class Renderer:
     ----------
     mode : str, optional
         One of `MODES`; without one nothing is shown.
-    width, height : int
-        Pixels.
     """
 
     def __init__(self, mode: str | None, width: int = SIDE, height: int = SIDE) -> None:
@@ -85,11 +83,11 @@ class Renderer:
 
     def render_all(self, fleet: Fleet) -> tuple[Image | None, ...]:
         """Return or show the present frames of the trials of all environments."""
-        found: list[Image | None] = []
+        images: list[Image | None] = []
         for env in range(len(fleet)):
             bank, row = fleet.seat(env)
-            found.append(self.render(bank.group, row, bank.outlook, row, env))
-        return tuple(found)
+            images.append(self.render(bank.group, row, bank.outlook, row, env))
+        return tuple(images)
 
     def close(self) -> None:
         """Close the page, if there is one."""
@@ -100,8 +98,8 @@ class Renderer:
 
 def _visited(outlook: OutlookTables, row: int) -> list[int]:
     """Return the intersections of the goals that the ego of a trial, by its row, has visited in this round."""
-    own = outlook.trial[row]
-    rows = range(own.first_goal, own.last_goal)
+    car = outlook.trial[row]
+    rows = range(car.first_goal, car.last_goal)
     return [outlook.goal[k].vertex for k in rows if outlook.done[k]]
 
 
@@ -111,9 +109,9 @@ def _marks(group: Group, b: int) -> Floats:
     if not contacts and not breaches:
         return NO_MARKS
     rate, now = group.instances[b].problem.rate, int(group.ticks[b])
-    found = [(one.x, one.y, MARKS.CONTACT, (now - one.tick) / rate) for one in contacts]
-    found += [
+    marks = [(one.x, one.y, MARKS.CONTACT, (now - one.tick) / rate) for one in contacts]
+    marks += [
         (one.x, one.y, MARKS.OWN if one.car == EGO else MARKS.OTHERS, (now - one.tick) / rate)
         for one in (*breaches, *accused(contacts))
     ]
-    return np.array(found, dtype=np.float64)
+    return np.array(marks, dtype=np.float64)

@@ -39,8 +39,6 @@ class ActionMap:
     kind : str
         ``continuous``: two numbers from -1 to 1, speed and yaw rate, scaled to the car's bounds. ``discrete``: one of
         the pairs of `SPEEDS` and `TURNS`.
-    bounds : Bounds
-        The car's.
 
     Attributes
     ----------
@@ -108,37 +106,26 @@ OBSERVATIONS: Final = ("flat", "dict", "object")
 
 @dataclass(frozen=True)
 class Settings:
-    """The checked settings that environments of one kind share.
-
-    Parameters
-    ----------
-    config : Configuration, path, name or mapping
-        What the trials are drawn from.
-    observation : str
-        ``flat``, ``dict`` (the parts of the flat vector by name) or ``object`` (`cars.state.Observation`).
-    action : str
-        ``continuous`` or ``discrete``.
-    frame_skip : int
-        Ticks of a step, for which its command is held.
-    reward : mapping, optional
-        Weights of terms by name, where they are not those of `envs.terms.WEIGHTS`.
-    cars : int
-        Other cars that a flat observation shows, at most.
-    levels : int, mapping or Levels, optional
-        A pool of road networks that are drawn once.
-    formulas : mapping, optional
-        Formulas (docs/verdicts.md), texts by name, whose states are told in ``info["formulas"]``: what is said of each
-        so far, judged after every tick. The trials know nothing of them.
-    """
+    """The checked settings that environments of one kind share."""
 
     config: Configuration | str | os.PathLike[str] | Mapping[str, Any]
+    """What the trials are drawn from."""
     observation: str = "flat"
+    """``flat``, ``dict`` (the parts of the flat vector by name) or ``object`` (`cars.state.Observation`)."""
     action: str = "continuous"
+    """``continuous`` or ``discrete``."""
     frame_skip: int = 1
+    """Ticks of a step, for which its command is held."""
     reward: Mapping[str, float] | None = None
+    """Weights of terms by name, where they are not those of `envs.terms.WEIGHTS`."""
     cars: int = SHOWN
+    """Other cars that a flat observation shows, at most."""
     levels: Levels | Mapping[str, Any] | int | None = None
+    """A pool of road networks that are drawn once."""
     formulas: Mapping[str, str] | None = None
+    """Formulas (docs/verdicts.md), texts by name, whose states are told in ``info["formulas"]``: what is said of
+    each so far, judged after every tick. The trials know nothing of them.
+    """
     episodes: Episodes = field(init=False)
     actions: ActionMap = field(init=False)
     weights: Floats = field(init=False)
@@ -152,25 +139,25 @@ class Settings:
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or value < low:
                 raise _wrong(name, value, f"an integer >= {low}")
-        own = self.config if isinstance(self.config, Configuration) else load_config(self.config)
-        episodes = Episodes(own, Levels.of(self.levels))
+        configuration = self.config if isinstance(self.config, Configuration) else load_config(self.config)
+        episodes = Episodes(configuration, Levels.of(self.levels))
         (sample,) = episodes.draw([(0, 0, 0)])
         require_dubins(sample.problem.car, "environments move cars together, which is")
         if not can_share(sample):
             expected = "the embedded simulator, no formulas, no remote cars"
             raise InputError(
-                "can't be an environment", file=own.file, value=sample.simulator, expected=expected
+                "can't be an environment", file=configuration.file, value=sample.simulator, expected=expected
             )
         if self.formulas:
             with_formulas(sample, self.formulas)
-        found = {
+        parts = {
             "episodes": episodes,
             "actions": ActionMap(self.action, sample.problem.car.bounds),
             "weights": weights_of(self.reward),
             "sample": sample,
             "layout": Layout.of(sample.problem, self.cars),
         }
-        for name, value in found.items():
+        for name, value in parts.items():
             object.__setattr__(self, name, value)
 
     @property

@@ -86,8 +86,8 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         """
         super().reset(seed=seed)
         if seed is not None or not self._seeded:
-            own = int(self.np_random.integers(2**63)) if seed is None else seed
-            self.fleet.seed(0, (own, 0), (options or {}).get("episode", 0))
+            base_seed = int(self.np_random.integers(2**63)) if seed is None else seed
+            self.fleet.seed(0, (base_seed, 0), (options or {}).get("episode", 0))
             self._seeded = True
         self.fleet.begin([0])
         self._interventions = 0 if self._is_shielded else None
@@ -103,13 +103,13 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
             raise DubinsTrafficError("the episode is over, or has not begun: reset the environment")
         self.fleet.step([action])
         board = self.fleet.board.arrays
-        told = info_of_one(board["terms"][0], board["weighted"][0]) | self._states() | self._stepped_in()
+        info = info_of_one(board["terms"][0], board["weighted"][0]) | self._states() | self._stepped_in()
         ended, terminated = bool(self.fleet.ended[0]), False
         if ended:
             terminated = self.fleet.is_terminal(0)
-            (told["outcome"],) = self.fleet.outcomes([0])
-            told["trial"] = self.fleet.instance(0)
-        return self._observed(), float(board["reward"][0]), terminated, ended and not terminated, told
+            (info["outcome"],) = self.fleet.outcomes([0])
+            info["trial"] = self.fleet.instance(0)
+        return self._observed(), float(board["reward"][0]), terminated, ended and not terminated, info
 
     def commands(self, actions: Any) -> Floats:
         """Return the commands, (K, 2), speed in m/s and yaw rate in rad/s, of each tick of steps with these actions."""
@@ -168,6 +168,10 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
             return observed(
                 self.settings.observation, self.settings.layout, self.fleet.board.arrays["flat"][0]
             )
-        found = self._view.observe()  # its scan is the one that the laser has made in between
+        observation = self._view.observe()  # its scan is the one that the laser has made in between
         bank, row = self.fleet.seat(0)
-        return found if found.scan is None else found._replace(scan=bank.outlook.ranges[row].copy())
+        return (
+            observation
+            if observation.scan is None
+            else observation._replace(scan=bank.outlook.ranges[row].copy())
+        )

@@ -70,13 +70,7 @@ def info_of_one(terms: Floats, weighted: Floats) -> dict[str, Any]:
 
 
 class StepInfo:
-    """Makes the info of steps of all environments.
-
-    Parameters
-    ----------
-    envs : int
-        How many there are.
-    """
+    """Makes the info of steps of all environments."""
 
     def __init__(self, envs: int) -> None:
         everyone = np.ones(envs, dtype=np.bool_)

@@ -111,10 +111,10 @@ def begin_trials(outlook: OutlookTables, steps: StepTables) -> None:
     for b in range(outlook.trial.shape[0]):
         seek(b, outlook)
         sweep(b, 0, outlook)
-        own = steps.stride[b]
-        own.route = _route(b, outlook)
-        own.speed = outlook.state.speed[b, EGO]
-        own.yaw_rate = outlook.state.yaw_rate[b, EGO]
+        stride = steps.stride[b]
+        stride.route = _route(b, outlook)
+        stride.speed = outlook.state.speed[b, EGO]
+        stride.yaw_rate = outlook.state.yaw_rate[b, EGO]
 
 
 @jit
@@ -155,22 +155,22 @@ def step_trials(
         return -1
     for k in range(rows.shape[0]):
         b: int = rows[k]
-        own = steps.stride[b]
-        if own.left == 0:
+        stride = steps.stride[b]
+        if stride.left == 0:
             continue
         steps.one[0] = b
         if k + 1 < rows.shape[0]:
             _fetch(rows[k + 1], world)
         status = STATUS.RUNNING
-        pause = own.left - steps.scale[0].pause if steps.scale[0].pause > 0 else 0
+        pause = stride.left - steps.scale[0].pause if steps.scale[0].pause > 0 else 0
         if ticks > 0 and steps.scale[0].waits != 0:
-            pause = own.left
-        while own.left > max(pause, 0) and status == STATUS.RUNNING:
+            pause = stride.left
+        while stride.left > max(pause, 0) and status == STATUS.RUNNING:
             status = _tick(b, envs[k], commands, world, outlook, steps)
         steps.status[envs[k]] = status
         if status in (STATUS.ENDED, STATUS.COLLIDED, STATUS.FAULTY):
-            own.left = 0
-        special += 0 if status == STATUS.RUNNING and own.left == 0 else 1
+            stride.left = 0
+        special += 0 if status == STATUS.RUNNING and stride.left == 0 else 1
         _close(b, envs[k], outlook, steps)
     return special
 
@@ -179,16 +179,16 @@ def step_trials(
 def _fetch(b: int, world: World) -> None:
     """Have the processor bring what a tick of trial b reads, while it works at another one."""
     memory, drivers, state, labels = world.memory, world.drivers, world.state, world.labels
-    tick, own = world.progress.trial[b].tick + 1, world.rules[b]
+    tick, rules = world.progress.trial[b].tick + 1, world.rules[b]
     fetch(state.x, (b,))
     fetch(state.y, (b,))
     fetch(state.c, (b,))
     fetch(state.s, (b,))
     fetch(memory.kept, (b,))
-    fetch(memory.growth, (b, growth_row(tick, own)))
+    fetch(memory.growth, (b, growth_row(tick, rules)))
     fetch(memory.trail_x, (b, tick % memory.trail_x.shape[1]))
     fetch(memory.trail_y, (b, tick % memory.trail_x.shape[1]))
-    then = (tick + memory.trail_x.shape[1] - own.stand_ticks) % memory.trail_x.shape[1]
+    then = (tick + memory.trail_x.shape[1] - rules.stand_ticks) % memory.trail_x.shape[1]
     fetch(memory.trail_x, (b, then))
     fetch(memory.trail_y, (b, then))
     fetch(memory.car, (b,))
@@ -253,7 +253,7 @@ def _close(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
 @jit_inline
 def count_tick(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
     """Count what a tick has brought, but breaches and collisions; `b` and `e` (row): the trial's, and of its terms."""
-    own, seen = steps.stride[b], outlook.trial[b]
+    stride, seen = steps.stride[b], outlook.trial[b]
     rounds, sought = seen.rounds, seen.target
     left = INFINITE
     there = False
@@ -261,16 +261,16 @@ def count_tick(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> Non
         goal = outlook.goal[sought]
         there = outlook.labels.at[b, EGO] == goal.vertex and goal.fresh != 0
         left = 0.0 if there else metres_to_goal(b, EGO, sought, outlook)
-    if own.route < INFINITE and left < INFINITE:
-        steps.terms[e, TERM.PROGRESS] += own.route - left
+    if stride.route < INFINITE and left < INFINITE:
+        steps.terms[e, TERM.PROGRESS] += stride.route - left
     visited = seek(b, outlook)
     steps.terms[e, TERM.VISITS] += visited
     steps.terms[e, TERM.ROUNDS] += seen.rounds - rounds
-    own.route = _route(b, outlook) if visited != 0 or seen.target != sought else left
+    stride.route = _route(b, outlook) if visited != 0 or seen.target != sought else left
     speed, yaw_rate = outlook.state.speed[b, EGO], outlook.state.yaw_rate[b, EGO]
-    faster, turned = (speed - own.speed) / seen.speed, (yaw_rate - own.yaw_rate) / seen.yaw_rate
+    faster, turned = (speed - stride.speed) / seen.speed, (yaw_rate - stride.yaw_rate) / seen.yaw_rate
     steps.terms[e, TERM.COMFORT] += faster * faster + turned * turned
-    own.speed, own.yaw_rate = speed, yaw_rate
+    stride.speed, stride.yaw_rate = speed, yaw_rate
     steps.terms[e, TERM.TIME] += steps.scale[0].period
 
 

@@ -69,14 +69,14 @@ def weights_of(given: Mapping[str, float] | None) -> Floats:
 
 def _weighted(usual: Mapping[str, float], given: Mapping[str, float], field: str) -> dict[str, float]:
     """Return the weights by term, in the order of `usual`; `field` names what is given."""
-    own = dict(usual)
+    weights = dict(usual)
     for name, value in given.items():
-        if name not in own:
+        if name not in weights:
             raise InputError("no such term", field=field, value=name, expected=", ".join(usual))
         if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):  # pyright: ignore[reportUnnecessaryIsInstance]
             raise InputError("not a weight", field=f"{field}.{name}", value=value, expected="a finite number")
-        own[name] = float(value)
-    return own
+        weights[name] = float(value)
+    return weights
 
 
 ADVERSARY: Final[Mapping[str, float]] = {
@@ -135,13 +135,11 @@ class Pay:
             The terms of each car, but for breaches.
         broken : (N, P)
             How often each car has broken each of `PARTS`, where that counts.
-        car : int
-            The number of the car.
         """
         if car == EGO:
             costly: Floats = broken[EGO, :_FIRST].astype(np.float64)
-            own = np.concatenate([terms[EGO, : TERM.BREACHES], costly])
-            weighted: list[float] = (own * self._ego).tolist()
+            of_ego = np.concatenate([terms[EGO, : TERM.BREACHES], costly])
+            weighted: list[float] = (of_ego * self._ego).tolist()
             costs = dict(zip(COSTS, costly.tolist(), strict=True))
             return sum(weighted), {"reward_terms": dict(zip(TERMS, weighted, strict=True)), "cost": costs}
         parts = dict(zip(ASSUMPTIONS, map(float, broken[car, _FIRST:]), strict=True))
@@ -152,5 +150,5 @@ class Pay:
             task = (TERM.VISITS, TERM.ROUNDS, TERM.PROGRESS)
             done["spoiled"] = -float(sum(terms[EGO, k] * self._ego[k] for k in task))
             done["violated"] = float(broken[EGO, :AT_FAULT].sum())
-        found = {name: weight * {**done, **parts}[name] for name, weight in self._others.items()}
-        return sum(found.values()), {"reward_terms": found, "cost": parts}
+        terms_of_car = {name: weight * {**done, **parts}[name] for name, weight in self._others.items()}
+        return sum(terms_of_car.values()), {"reward_terms": terms_of_car, "cost": parts}

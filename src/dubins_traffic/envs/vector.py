@@ -149,23 +149,23 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
             for name in ("reward", "terms", "weighted"):
                 board[name][waiting] = 0.0
         rewards = board["reward"].copy()
-        told = self._infos.of_all(board["terms"], board["weighted"]) | self._states()
+        info = self._infos.of_all(board["terms"], board["weighted"]) | self._states()
         if not fleet.waiting:
-            return self._observed(), rewards, self._nothing.copy(), self._nothing.copy(), told
+            return self._observed(), rewards, self._nothing.copy(), self._nothing.copy(), info
         over = fleet.ended & ~waiting
         ended: list[int] = np.flatnonzero(over).tolist()
         terminated = self._nothing.copy()
         terminated[ended] = [fleet.is_terminal(env) for env in ended]
         last = self._ended(ended)
         if waiting.any():
-            told |= self._restarted(waiting) | self._states()
+            info |= self._restarted(waiting) | self._states()
         if ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
-            told |= self._final(over, ended, told, last)
+            info |= self._final(over, ended, info, last)
             fleet.begin(ended)
-            told |= self._begun(ended) | self._states()
+            info |= self._begun(ended) | self._states()
         else:
-            told |= last
-        return self._observed(), rewards, terminated, over & ~terminated, told
+            info |= last
+        return self._observed(), rewards, terminated, over & ~terminated, info
 
     def commands(self, actions: Any) -> Floats:
         """Return the commands, (K, 2), speed in m/s and yaw rate in rad/s, of each tick of one environment's steps."""
@@ -186,7 +186,9 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         if not self.settings.formulas:
             return {}
         each = [self.fleet.states(env) for env in range(self.num_envs)]
-        return {"formulas": {name: np.array([own[name] for own in each]) for name in self.settings.formulas}}
+        return {
+            "formulas": {name: np.array([states[name] for states in each]) for name in self.settings.formulas}
+        }
 
     def _ended(self, some: Sequence[int]) -> dict[str, Any]:
         """Return the infos of episodes that have ended."""
@@ -196,13 +198,13 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         return outcomes | self._begun(some)
 
     def _final(
-        self, over: Bools, ended: Sequence[int], told: dict[str, Any], last: dict[str, Any]
+        self, over: Bools, ended: Sequence[int], info: dict[str, Any], last: dict[str, Any]
     ) -> dict[str, Any]:
         """Return the last observations and infos of episodes that have ended in this step."""
         flat = self.fleet.board.arrays["flat"]
-        own, layout = self.settings.observation, self.settings.layout
-        final = {**told, "_reward_terms": over.copy(), "_cost": over.copy(), **last}
-        observations = self._spread(ended, "final_obs", [observed(own, layout, flat[env]) for env in ended])
+        kind, layout = self.settings.observation, self.settings.layout
+        final = {**info, "_reward_terms": over.copy(), "_cost": over.copy(), **last}
+        observations = self._spread(ended, "final_obs", [observed(kind, layout, flat[env]) for env in ended])
         return {**observations, "final_info": final, "_final_info": over.copy()}
 
     def _spread(self, some: Sequence[int], name: str, values: Sequence[Any]) -> dict[str, Any]:

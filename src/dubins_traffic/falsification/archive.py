@@ -41,11 +41,6 @@ class Journal:
 
     A trial is known by its number and the hash of its genome: another one of that number is run. A line begins with its
     checksum; what is not as it was written, such as a last line that was cut off, is passed over, and its trial run.
-
-    Parameters
-    ----------
-    path : Path
-        The file, which need not be there.
     """
 
     def __init__(self, path: Path) -> None:
@@ -53,13 +48,13 @@ class Journal:
         self._lines: dict[Key, str] = {}
         self._waiting: list[Finished] = []
         self._written = time.monotonic()
-        told = read_bytes(path).decode(errors="replace").splitlines(keepends=True) if path.is_file() else []
-        for line in told:
+        lines = read_bytes(path).decode(errors="replace").splitlines(keepends=True) if path.is_file() else []
+        for line in lines:
             checksum, _, text = line.partition(" ")
             if checksum == _checksum(text):
                 number, digest, _ = json.loads(text)
                 self._lines[number, digest] = line
-        self._sound = 0 < len(self._lines) == len(told)
+        self._sound = 0 < len(self._lines) == len(lines)
 
     def known(self, number: int, genome: Genome) -> Tried | None:
         """Return what came of a trial; None if it is not here."""
@@ -179,13 +174,13 @@ class Archive:
         path = self.folder / STATE
         if not path.is_file():
             return None
-        found = parse_json(read_text(path), str(path))
-        if "state" not in found or found.get("sha256") != _digest(found["state"]):
+        document = parse_json(read_text(path), str(path))
+        if "state" not in document or document.get("sha256") != _digest(document["state"]):
             raise InputError(
                 "not the state of a search as it was written", file=str(path), field="sha256",
-                value=found.get("sha256"), expected="the hash of `state`; begin anew in another folder",
+                value=document.get("sha256"), expected="the hash of `state`; begin anew in another folder",
             )  # fmt: skip
-        return found["state"]
+        return document["state"]
 
     def remember(self, state: Mapping[str, Any]) -> None:
         """Write down where the search goes on; once this returns, it survives a loss of power."""
@@ -209,8 +204,6 @@ def opened(folder: Path, settings: Any, *, resume: bool) -> Generator[Archive]:
 
     Parameters
     ----------
-    folder : Path
-        The folder.
     settings : JSON
         What is searched; a search that is resumed must have the same.
     resume : bool
@@ -262,8 +255,6 @@ def coverage_page(
         What tells the search from others: `controller`, `targets`, `seed`, `strategy`.
     counts : mapping
         What became of its trials, by the keys of `COUNTS`.
-    rows : sequence of Row
-        The coverage.
     cases : mapping
         What was found, by the names of the files.
     found_in : mapping
@@ -300,31 +291,23 @@ def _roads(degree: int) -> str:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """What a search leaves.
-
-    Attributes
-    ----------
-    folder : Path
-        Its folder.
-    cases : dict of str to Case
-        One case for each kind of failure, by the name of its cell.
-    trials, discarded, faulty, violated : int
-        How many trials it has run; of these, in how many the assumption was broken first, how many ended by a fault,
-        and in how many the ego broke a rule that was asked for.
-    coverage : list of Row
-        Which rule, manoeuvre and crossing were put to the test.
-    fault : str
-        How many trials ended by which fault, and why the first; empty if none did.
-    """
+    """What a search leaves."""
 
     folder: Path
+    """Its folder."""
     cases: Mapping[str, Case]
+    """One case for each kind of failure, by the name of its cell."""
     trials: int
     discarded: int
     faulty: int
     violated: int
+    """`trials`, `discarded`, `faulty`, `violated`: how many trials it has run; of these, in how many the assumption
+    was broken first, how many ended by a fault, and in how many the ego broke a rule that was asked for.
+    """
     coverage: list[Row]
+    """Which rule, manoeuvre and crossing were put to the test."""
     fault: str = ""
+    """How many trials ended by which fault, and why the first; empty if none did."""
 
     @property
     def page(self) -> Path:

@@ -81,7 +81,7 @@ class Case:
         document = instance_to_document(replace(self.instance, extra={**extra, KEY: asdict(self.story)}))
         return (
             "{\n"
-            + ",\n".join(f" {json.dumps(key)}: {json.dumps(own)}" for key, own in document.items())
+            + ",\n".join(f" {json.dumps(key)}: {json.dumps(entry)}" for key, entry in document.items())
             + "\n}\n"
         )
 
@@ -100,18 +100,20 @@ def read_case(path: str | os.PathLike[str]) -> Case:
 
 def case_of(instance: Instance, name: str | None = None) -> Case:
     """Return the case that the document of an instance carries; `name` is the file that errors mention."""
-    found: Any = instance.extra.get(KEY)
+    story_document: Any = instance.extra.get(KEY)
     expected = "an object with rule, manoeuvre, degree, controller, time, tick and sentence"
-    if not isinstance(found, Mapping):
-        raise InputError("not a case", file=name, field=KEY, value=found, expected=expected)
-    told = cast("Mapping[str, Any]", found)
+    if not isinstance(story_document, Mapping):
+        raise InputError("not a case", file=name, field=KEY, value=story_document, expected=expected)
+    document = cast("Mapping[str, Any]", story_document)
     try:
-        story = Story(**told)
+        story = Story(**document)
         _check_kinds(story, name)
         if story.manoeuvre.upper() not in Manoeuvre.__members__:
             raise InputError("no manoeuvre", file=name, field=f"{KEY}.manoeuvre", value=story.manoeuvre)
     except (TypeError, AttributeError):
-        raise InputError("not a case", file=name, field=KEY, value=sorted(told), expected=expected) from None
+        raise InputError(
+            "not a case", file=name, field=KEY, value=sorted(document), expected=expected
+        ) from None
     return Case(instance, story)
 
 
@@ -133,8 +135,6 @@ def sentence_of(record: Record, score: Score, breach: Violation) -> str:
     ----------
     record, score
         The trial, up to the breach or farther.
-    breach
-        The ego's.
     """
     when = f"At {breach.time:.2f} s the ego"
     match breach.rule:
@@ -164,7 +164,7 @@ def sentence_of(record: Record, score: Score, breach: Violation) -> str:
 
 
 def _collision(record: Record, score: Score, breach: Violation) -> str:
-    hits = [own for own in score.collisions if abs(own.time - breach.time) <= 1.5 / record.frames.rate]
+    hits = [hit for hit in score.collisions if abs(hit.time - breach.time) <= 1.5 / record.frames.rate]
     other = hits[0].partner if hits else "something"
     place = f"at {_crossing(breach)}" if breach.where.intersection else f"on {_road(breach)}"
     speed = float(record.frames.speed[max(0, breach.tick - 1), EGO])
@@ -207,8 +207,12 @@ def _crossing(breach: Violation) -> str:
 
 
 def _road(breach: Violation) -> str:
-    own = breach.where.segment
-    return "its road" if own is None else f"the road from ({own[0]}, {own[1]}) to ({own[2]}, {own[3]})"
+    segment = breach.where.segment
+    return (
+        "its road"
+        if segment is None
+        else f"the road from ({segment[0]}, {segment[1]}) to ({segment[2]}, {segment[3]})"
+    )
 
 
 Make = Callable[[], "Controller"] | Remote
@@ -245,8 +249,8 @@ class Judged:
         if rule in contract.CONTRACT:
             ticks = [tick for cell, tick in self.tried.cells if cell.rule == rule]
             return contract.breach_of(rule, ticks[0], verdict, self.record) if verdict and ticks else None
-        own = () if verdict is None else verdict.violations
-        for broken in own:
+        violations = () if verdict is None else verdict.violations
+        for broken in violations:
             if broken.car == EGO_NAME and broken.rule == rule:
                 return broken
         time = broken_formulas(self.score).get(rule)
@@ -263,12 +267,12 @@ class Judged:
         limit = limit_of(problem)
         if limit is None or late is None or late >= 0.0:
             return None
-        found = first_overdue(self.record, limit)
-        if found is None:
+        overdue = first_overdue(self.record, limit)
+        if overdue is None:
             return None
-        x, y = float(frames.x[found.tick, EGO]), float(frames.y[found.tick, EGO])
-        times = found.tick / frames.rate, found.tick, found.since / frames.rate
-        return Violation(LIVENESS, EGO_NAME, *times, Place(x, y, found.goal, None))
+        x, y = float(frames.x[overdue.tick, EGO]), float(frames.y[overdue.tick, EGO])
+        times = overdue.tick / frames.rate, overdue.tick, overdue.since / frames.rate
+        return Violation(LIVENESS, EGO_NAME, *times, Place(x, y, overdue.goal, None))
 
 
 def judge(instance: Instance, make: Make, name: str) -> Judged:
@@ -284,8 +288,8 @@ def judge(instance: Instance, make: Make, name: str) -> Judged:
     document = json.loads(json.dumps(instance_to_document(instance)))
     again = instance_from_document(document)
     record = make.drive(again) if isinstance(make, Remote) else _recorded(again, make, name)
-    found, passages = judged_record(record)
-    return Judged(record, found, tried_of(found, record.ending, passages, 0, record.instance))
+    judged_score, passages = judged_record(record)
+    return Judged(record, judged_score, tried_of(judged_score, record.ending, passages, 0, record.instance))
 
 
 def _recorded(instance: Instance, make: Maker, name: str) -> Record:
@@ -307,21 +311,21 @@ def confirm(instance: Instance, rule: str, make: Make, name: str) -> Judged | No
     breach = first.first(rule)
     if breach is None:
         return None
-    found = judge(cut_to(instance, breach.tick), make, name)
-    return found if found.breach(rule) is not None else None
+    cut = judge(cut_to(instance, breach.tick), make, name)
+    return cut if cut.breach(rule) is not None else None
 
 
 def case_in(instance: Instance, cell: Cell, make: Make, name: str) -> Case | None:
     """Return an instance as a case of the ego's failure in a cell, judged afresh; None if it does not stand."""
-    found = confirm(instance, cell.rule, make, name)
-    breach = None if found is None else found.breach(cell.rule)
-    if found is None or breach is None:
+    confirmed = confirm(instance, cell.rule, make, name)
+    breach = None if confirmed is None else confirmed.breach(cell.rule)
+    if confirmed is None or breach is None:
         return None
     story = Story(
         cell.rule, cell.manoeuvre.name.lower(), cell.degree, name, breach.time, breach.tick,
-        sentence_of(found.record, found.score, breach),
+        sentence_of(confirmed.record, confirmed.score, breach),
     )  # fmt: skip
-    return Case(found.record.instance, story)
+    return Case(confirmed.record.instance, story)
 
 
 def write_page(
@@ -336,12 +340,14 @@ def write_page(
     name = name_of(driver)
     judged = judge(case.instance, driver_of(driver), name)
     record, verdict = judged.record, judged.score.verdict
-    own = [] if verdict is None else [broken.rule for broken in verdict.violations if broken.car == EGO_NAME]
+    rules = (
+        [] if verdict is None else [broken.rule for broken in verdict.violations if broken.car == EGO_NAME]
+    )
     summary = {
         "rule": case.story.rule,
         "what happens": case.story.sentence,
         "controller": name,
-        "broken by the ego": ", ".join(dict.fromkeys(own)) or "nothing",
+        "broken by the ego": ", ".join(dict.fromkeys(rules)) or "nothing",
     }
     write_replay(
         path, record.instance, record.frames, record.ending, summary, (), verdict, overwrite=overwrite

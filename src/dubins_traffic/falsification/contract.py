@@ -44,20 +44,15 @@ CAPRICIOUS: Final = ("rolls", "left", "blocks", "tailgates", "parks")
 
 
 @dataclass(frozen=True, slots=True)
-class Kept:
-    """What came of the contract in a trial.
-
-    Attributes
-    ----------
-    margins : dict of str to float
-        Of `BLOCKED` by how many seconds the longest wait stayed below its limit, where the trial is longer than that;
-        of `PROVOKED` 1 where no such car broke anything. Negative where it was not kept.
-    frames : dict of str to int
-        The frames in which it was broken.
-    """
+class ContractMargins:
+    """What came of the contract in a trial."""
 
     margins: dict[str, float] = field(default_factory=dict[str, float])
+    """Of `BLOCKED` by how many seconds the longest wait stayed below its limit, where the trial is longer than that;
+    of `PROVOKED` 1 where no such car broke anything. Negative where it was not kept.
+    """
     frames: dict[str, int] = field(default_factory=dict[str, int])
+    """The frames in which it was broken."""
 
 
 def limit_of(problem: Problem) -> float | None:
@@ -74,31 +69,31 @@ def keeps_law(agent: EAgent) -> bool:
     )  # fmt: skip
 
 
-def kept(verdict: Verdict, passages: Passages, trial: int, instance: Instance) -> Kept:
+def contract_margins(verdict: Verdict, passages: Passages, trial: int, instance: Instance) -> ContractMargins:
     """Return what came of the contract in number `trial` of `passages`, the trial of an instance, by its verdict."""
-    found = Kept()
+    contract = ContractMargins()
     provoked = provocation(verdict, instance)
     if provoked is not None or any(keeps_law(agent) for agent in instance.e_agents):
-        found.margins[PROVOKED] = 1.0 if provoked is None else -1.0
+        contract.margins[PROVOKED] = 1.0 if provoked is None else -1.0
     if provoked is not None:
-        found.frames[PROVOKED] = provoked.tick
+        contract.frames[PROVOKED] = provoked.tick
     wait = _longest_wait(verdict, passages, trial, instance)
     if wait is not None:
         spare, tick = wait
-        found.margins[BLOCKED] = spare
+        contract.margins[BLOCKED] = spare
         if spare < 0.0:
-            found.frames[BLOCKED] = tick
-    return found
+            contract.frames[BLOCKED] = tick
+    return contract
 
 
 def provocation(verdict: Verdict, instance: Instance) -> Violation | None:
     """Return the breach of a car that keeps the law, if it is among the first of all and the ego's is not."""
     first = verdict.violations[0].tick if verdict.violations else -1
-    at_first = [own for own in verdict.violations if own.tick == first]
+    at_first = [violation for violation in verdict.violations if violation.tick == first]
     lawful = {agent.name for agent in instance.e_agents if keeps_law(agent)}
-    if any(own.car == EGO_NAME for own in at_first):
+    if any(violation.car == EGO_NAME for violation in at_first):
         return None
-    return next((own for own in at_first if own.car in lawful), None)
+    return next((violation for violation in at_first if violation.car in lawful), None)
 
 
 def _longest_wait(
@@ -112,7 +107,7 @@ def _longest_wait(
     if limit is None or instance.duration <= limit:
         return None
     allowed = _ticks(limit, rate)
-    last = min([max(own.tick - 1, 0) for own in verdict.violations], default=passages.last(trial))
+    last = min([max(violation.tick - 1, 0) for violation in verdict.violations], default=passages.last(trial))
     visits = passages.visits(trial, frozenset(instance.problem.goal_vertices))
     marks = [0, *(tick for tick in visits if 0 < tick <= last), last]
     gaps = np.diff(marks)
@@ -127,9 +122,11 @@ def breach_of(target: str, tick: int, verdict: Verdict, record: Record) -> Viola
     """Return a breach of the contract, in a frame of a record, as one of the car that is concerned."""
     frames = record.frames
     if target == PROVOKED:
-        found = provocation(verdict, record.instance)
-        if found is not None:
-            return Violation(target, found.car, found.time, found.tick, found.since, found.where)
+        provoked = provocation(verdict, record.instance)
+        if provoked is not None:
+            return Violation(
+                target, provoked.car, provoked.time, provoked.tick, provoked.since, provoked.where
+            )
     x, y = float(frames.x[tick, EGO]), float(frames.y[tick, EGO])
     since = tick - 1 - _ticks(limit_of(record.instance.problem) or 0.0, frames.rate)
     return Violation(
@@ -159,7 +156,7 @@ def sentence_of(verdict: Verdict | None, breach: Violation) -> str:
 
 def check_lawful(instances: Sequence[Instance]) -> None:
     """Refuse trials in which no e-agent keeps the law."""
-    if not any(keeps_law(agent) for own in instances for agent in own.e_agents):
+    if not any(keeps_law(agent) for instance in instances for agent in instance.e_agents):
         raise InputError(
             "has no e-agents that keep the law", file="--rule", value=PROVOKED,
             expected="e-agents of the kind lawful or nemesis",
@@ -213,11 +210,11 @@ def first_overdue(record: Record, limit: float) -> Overdue | None:
 
 def check_long_enough(instances: Sequence[Instance], target: str) -> None:
     """Refuse trials none of which lasts as long as a gap may; `target` is what is asked for."""
-    limits = [limit_of(own.problem) for own in instances]
+    limits = [limit_of(instance.problem) for instance in instances]
     least = min([limit for limit in limits if limit is not None], default=None)
     if least is None:
         raise InputError("has no goals that can be visited", file="--rule", value=target)
-    longest = max(own.duration for own in instances)
+    longest = max(instance.duration for instance in instances)
     if longest <= least:
         raise InputError(
             "no gap between visits can be over its limit in trials so short", file="--duration", value=longest,

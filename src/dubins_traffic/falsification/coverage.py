@@ -130,18 +130,20 @@ def possible(instances: Iterable[Instance]) -> list[Cell]:
 
     Turning round and whatever is cut off by the beginning or the end of a trial is left out.
     """
-    found: set[Cell] = set()
+    cells: set[Cell] = set()
     for instance in instances:
         least = RuleParameters.from_mapping(instance.problem.rules).crossing_degree
         for degree in {int(degree) for degree in instance.problem.network.degrees}:
             through = THROUGH if degree > 2 else ()
             for rule in EGO_RULES:
                 if rule.startswith("3."):
-                    found |= {Cell(rule, own, degree) for own in through if degree >= least}
+                    cells |= {Cell(rule, manoeuvre, degree) for manoeuvre in through if degree >= least}
                 else:
                     at_discs = through if rule.startswith("1.") else ()
-                    found |= {Cell(rule, own, degree) for own in (*ALONG.get(rule, ()), *at_discs)}
-    return sorted(found, key=lambda cell: cell.number)
+                    cells |= {
+                        Cell(rule, manoeuvre, degree) for manoeuvre in (*ALONG.get(rule, ()), *at_discs)
+                    }
+    return sorted(cells, key=lambda cell: cell.number)
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,7 +25,7 @@ from dubins_traffic.falsification.contract import TARGETS
 from dubins_traffic.falsification.coverage import Counts
 from dubins_traffic.falsification.sampling import STREAM, prepared
 from dubins_traffic.falsification.splitting import Begin, Split, beginner, split
-from dubins_traffic.falsification.trying import Crew, crew_of, in_order
+from dubins_traffic.falsification.trying import Runner, in_order, runner_of
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.draw import draw_many
 
@@ -40,36 +40,26 @@ MOST_REPEATED: Final = 0.5
 
 @dataclass(frozen=True, slots=True)
 class Replicas:
-    """What runs say together.
-
-    Attributes
-    ----------
-    probability : float
-        The mean of their estimates.
-    interval : (float, float)
-        Its 95 % interval: Korn and Graubard's, from the spread of the estimates. If nothing was branched off, or no run
-        got to the event, it is Clopper and Pearson's of the first trials of all runs, which are those of Monte Carlo.
-        If most runs did not get there, it reaches around both, since the spread of few says little.
-    trials, extinct : int
-        How many trials ran; how many runs ended without the event.
-    repeated : float
-        The share of the branches that came to the same margin as their parents: nothing was left to chance for them.
-    worth : float or None
-        How many trials of Monte Carlo would have varied as much, p (1 - p) / variance; None if no run got there.
-    better : str
-        The method with the smaller variance from as many trials.
-    advice : tuple of str
-        What a user should know of the runs, in sentences.
-    """
+    """What runs say together."""
 
     probability: float
+    """The mean of their estimates."""
     interval: Interval
+    """Its 95 % interval: Korn and Graubard's, from the spread of the estimates. If nothing was branched off, or no
+    run got to the event, it is Clopper and Pearson's of the first trials of all runs, which are those of Monte
+    Carlo. If most runs did not get there, it reaches around both, since the spread of few says little.
+    """
     trials: int
     extinct: int
+    """`trials`, `extinct`: how many trials ran; how many runs ended without the event."""
     repeated: float
+    """The share of the branches that came to the same margin as their parents: nothing was left to chance for them."""
     worth: float | None
+    """How many trials of Monte Carlo would have varied as much, p (1 - p) / variance; None if no run got there."""
     better: str
+    """The method with the smaller variance from as many trials."""
     advice: tuple[str, ...] = ()
+    """What a user should know of the runs, in sentences."""
 
     def to_json(self) -> dict[str, Any]:
         """Return what a JSON object of the estimate says beyond it."""
@@ -81,54 +71,57 @@ class Replicas:
 
 def combined(runs: Sequence[Split], particles: int) -> Replicas:
     """Return what at least two independent runs of so many particles say together."""
-    found = [run.probability for run in runs]
-    mean = math.fsum(found) / len(runs)
+    probabilities = [run.probability for run in runs]
+    mean = math.fsum(probabilities) / len(runs)
     trials, branches = sum(run.trials for run in runs), sum(run.branches for run in runs)
-    extinct = sum(value == 0.0 for value in found)
+    extinct = sum(value == 0.0 for value in probabilities)
     counted = clopper_pearson(sum(run.counted for run in runs), len(runs) * particles)
     # Equal estimates show no spread, which says nothing of it: then Monte Carlo's trials have the word.
-    flat = len(set(found)) == 1
-    interval = counted if branches == 0 or mean == 0.0 else (mean, mean) if flat else korn_graubard(found)
+    flat = len(set(probabilities)) == 1
+    interval = (
+        counted if branches == 0 or mean == 0.0 else (mean, mean) if flat else korn_graubard(probabilities)
+    )
     if 2 * extinct > len(runs) or flat:
         interval = min(interval[0], counted[0]), max(interval[1], counted[1])
     repeated = sum(run.repeated for run in runs) / branches if branches else 0.0
-    equal = trials if branches == 0 or (flat and mean > 0.0) else worth(found) if mean > 0.0 else None
+    equal = trials if branches == 0 or (flat and mean > 0.0) else worth(probabilities) if mean > 0.0 else None
     lost = equal is None or equal <= trials or 2 * extinct > len(runs)
     better = MONTE_CARLO if lost else SPLITTING
-    told = Replicas(mean, interval, trials, extinct, repeated, equal, better)
-    return replace(told, advice=_advice(told, len(runs), particles))
+    replicas = Replicas(mean, interval, trials, extinct, repeated, equal, better)
+    return replace(replicas, advice=_advice(replicas, len(runs), particles))
 
 
-def _advice(found: Replicas, runs: int, particles: int) -> tuple[str, ...]:
+def _advice(replicas: Replicas, runs: int, particles: int) -> tuple[str, ...]:
     """Return what a user should know of runs, in sentences."""
-    told: list[str] = []
-    if found.extinct == runs:
-        told.append(
+    sentences: list[str] = []
+    if replicas.extinct == runs:
+        sentences.append(
             f"no run got there: that does not say that it can't happen, only that its probability is at most "
-            f"{found.interval[1]:.2g} (95 %), by the first {runs * particles} trials"
+            f"{replicas.interval[1]:.2g} (95 %), by the first {runs * particles} trials"
         )
-    elif found.extinct:
+    elif replicas.extinct:
         wider = f"; the interval reaches around that of their first {runs * particles} trials"
-        told.append(
-            f"{found.extinct} of {runs} runs ended without the event{wider if 2 * found.extinct > runs else ''}"
+        sentences.append(
+            f"{replicas.extinct} of {runs} runs ended without the event{wider if 2 * replicas.extinct > runs else ''}"
         )
-    if found.repeated > MOST_REPEATED:
-        told.append(
-            f"{found.repeated:.0%} of the trials that were branched off came to the margin of their parents: little is "
-            "left to chance where they branch off"
+    if replicas.repeated > MOST_REPEATED:
+        sentences.append(
+            f"{replicas.repeated:.0%} of the trials that were branched off came to the margin of their parents: little "
+            "is left to chance where they branch off"
         )
-    if found.worth is None:
-        bound = clopper_pearson(0, found.trials)[1]
-        told.append(
-            f"Monte Carlo is better here: {found.trials} trials without the event would bound it by {bound:.2g}"
+    if replicas.worth is None:
+        bound = clopper_pearson(0, replicas.trials)[1]
+        sentences.append(
+            f"Monte Carlo is better here: {replicas.trials} trials without the event would bound it by {bound:.2g}"
         )
-    elif found.better == MONTE_CARLO:
-        told.append(
-            f"Monte Carlo is better here: about {found.worth:.0f} trials of it vary as much as these {found.trials}"
+    elif replicas.better == MONTE_CARLO:
+        sentences.append(
+            f"Monte Carlo is better here: about {replicas.worth:.0f} trials of it vary as much as "
+            f"these {replicas.trials}"
         )
     else:
-        told.append(f"Monte Carlo would need about {found.worth:.0f} trials to vary as little")
-    return tuple(told)
+        sentences.append(f"Monte Carlo would need about {replicas.worth:.0f} trials to vary as little")
+    return tuple(sentences)
 
 
 METHODS: Final = ("monte-carlo", "splitting")
@@ -144,46 +137,34 @@ Progress = Callable[[int], object]
 
 @dataclass(frozen=True, slots=True)
 class Probability:
-    """The probability of an event.
-
-    Attributes
-    ----------
-    method : str
-        ``monte-carlo`` or ``splitting``.
-    event : str
-        What happens, in words.
-    probability : float
-        The estimate.
-    interval : (float, float)
-        Its 95 % interval: Clopper and Pearson's, or that of independent runs (`Replicas`).
-    wilson : (float, float) or None
-        Wilson's interval, of Monte Carlo.
-    trials, events, discarded : int
-        How many trials ran; of Monte Carlo, in how many the event happened, and how many were left out since the
-        e-agents broke the assumption before the ego broke anything.
-    runs : tuple of float
-        The estimates of the independent runs of splitting.
-    left_out : int
-        Trials that ended by a fault before the event: they are no evidence, and all of Monte Carlo's figures are those
-        of the others. If these are none, the probability is not a number.
-    fault : str
-        How many trials ended by which fault, and why the first; empty if none did.
-    replicas : Replicas or None
-        What these runs say together, and whether Monte Carlo is better.
-    """
+    """The probability of an event."""
 
     method: str
+    """``monte-carlo`` or ``splitting``."""
     event: str
+    """What happens, in words."""
     probability: float
+    """The estimate."""
     interval: Interval
+    """Its 95 % interval: Clopper and Pearson's, or that of independent runs (`Replicas`)."""
     wilson: Interval | None
+    """Wilson's interval, of Monte Carlo."""
     trials: int
     events: int | None
     discarded: int | None
+    """`trials`, `events`, `discarded`: how many trials ran; of Monte Carlo, in how many the event happened, and how
+    many were left out since the e-agents broke the assumption before the ego broke anything.
+    """
     runs: tuple[float, ...] = ()
+    """The estimates of the independent runs of splitting."""
     left_out: int = 0
+    """Trials that ended by a fault before the event: they are no evidence, and all of Monte Carlo's figures are
+    those of the others. If these are none, the probability is not a number.
+    """
     fault: str = ""
+    """How many trials ended by which fault, and why the first; empty if none did."""
     replicas: Replicas | None = None
+    """What these runs say together, and whether Monte Carlo is better."""
 
     def to_json(self) -> dict[str, Any]:
         """Return the estimate as a JSON object."""
@@ -252,7 +233,7 @@ def estimate(
         Without the extra `falsify`, which brings SciPy.
     """
     distributions("an estimate of a probability", "falsify")
-    own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
+    config = configuration if isinstance(configuration, Configuration) else load_config(configuration)
     if event not in TARGETS:
         expected = f"one of {', '.join(TARGETS)}"
         raise InputError("no rule of the ego's", file="--event", value=event, expected=expected)
@@ -262,19 +243,19 @@ def estimate(
         )
     if not math.isfinite(below):
         raise InputError("not a margin", file="--below", value=below, expected="a finite number")
-    own = prepared(own, duration, {})
+    config = prepared(config, duration, {})
     name = controller if isinstance(controller, str) else getattr(controller, "__name__", "controller")
-    told = progress or _silent
+    notify = progress or _silent
     if method == "splitting":
         begin = beginner(controller, event)
-        return by_splitting(drawn(own, seed), begin, event, below, particles, runs, seed, told)
+        return by_splitting(drawn(config, seed), begin, event, below, particles, runs, seed, notify)
     count = trials or 10_000
-    with crew_of(controller, name, workers, None) as crew:
-        return by_counting(draw_many(own, seed, range(count)), crew, event, below, told)
+    with runner_of(controller, name, workers, None) as crew:
+        return by_counting(draw_many(config, seed, range(count)), crew, event, below, notify)
 
 
 def by_counting(
-    instances: Iterable[Instance], crew: Crew, event: str, below: float, progress: Progress
+    instances: Iterable[Instance], crew: Runner, event: str, below: float, progress: Progress
 ) -> Probability:
     """Return what Monte Carlo gives on some trials; the parameters are those of `estimate`."""
     counts = Counts()
@@ -300,14 +281,14 @@ def by_counting(
     if waiting:
         run()
     known = counts.trials - left_out
-    told = (), left_out, counts.fault_notice()
+    rest = (), left_out, counts.fault_notice()
     if not known:
         return Probability(
-            "monte-carlo", words(event, below), math.nan, (0.0, 1.0), None, counts.trials, 0, 0, *told
+            "monte-carlo", words(event, below), math.nan, (0.0, 1.0), None, counts.trials, 0, 0, *rest
         )
     return Probability(
         "monte-carlo", words(event, below), happened / known, clopper_pearson(happened, known),
-        wilson(happened, known), counts.trials, happened, counts.discarded, *told,
+        wilson(happened, known), counts.trials, happened, counts.discarded, *rest,
     )  # fmt: skip
 
 
@@ -324,13 +305,13 @@ def by_splitting(
         some = range(first, min(first + most, runs))
         dice = [np.random.default_rng([STREAM, seed, run, 1]) for run in some]
         instances = draw(range(some.start * particles, some.stop * particles))
-        before = sum(own.trials for own in splits)
+        before = sum(done.trials for done in splits)
         splits += split(instances, begin, below, dice, lambda done, before=before: progress(before + done))
-    found = combined(splits, particles)
-    each = tuple(own.probability for own in splits)
+    whole = combined(splits, particles)
+    each = tuple(done.probability for done in splits)
     return Probability(
-        "splitting", words(event, below), found.probability, found.interval, None, found.trials, None, None, each,
-        replicas=found,
+        "splitting", words(event, below), whole.probability, whole.interval, None, whole.trials, None, None, each,
+        replicas=whole,
     )  # fmt: skip
 
 
@@ -338,9 +319,9 @@ def drawn(configuration: Configuration, seed: int) -> Callable[[range], list[Ins
     """Return what draws the instances of numbers from a configuration, all of the longest duration that it allows."""
 
     def draw(numbers: range) -> list[Instance]:
-        found = list(draw_many(configuration, seed, numbers))
-        longest = max(own.duration for own in found)
-        return [own if own.duration == longest else replace(own, duration=longest) for own in found]
+        trials_drawn = list(draw_many(configuration, seed, numbers))
+        longest = max(instance.duration for instance in trials_drawn)
+        return [one if one.duration == longest else replace(one, duration=longest) for one in trials_drawn]
 
     return draw
 

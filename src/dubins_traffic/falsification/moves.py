@@ -25,27 +25,18 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True)
 class Genome:
-    """What an instance of a search is made of.
-
-    Attributes
-    ----------
-    base : int
-        Number of the trial of the configuration whose network, goals and cars it has.
-    root : int
-        Number of the trial of the search that was drawn and from which this one descends.
-    starts : mapping of int to Pose
-        Other starts of some of its cars, by the cars' numbers.
-    tables : mapping of int to (K, 7) float64
-        What each e-agent chooses (`agents.choices`), by the cars' numbers.
-    whims : mapping of int to (K, 5) float64
-        What each free e-agent likes to do (`falsification.whims`), by the cars' numbers.
-    """
+    """What an instance of a search is made of."""
 
     base: int
+    """Number of the trial of the configuration whose network, goals and cars it has."""
     root: int
+    """Number of the trial of the search that was drawn and from which this one descends."""
     starts: Mapping[int, Pose] = field(default_factory=dict[int, Pose])
+    """Other starts of some of its cars, by the cars' numbers."""
     tables: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
+    """Shape (K, 7) each. What each e-agent chooses (`agents.choices`), by the cars' numbers."""
     whims: Mapping[int, Floats] = field(default_factory=dict[int, Floats])
+    """Shape (K, 5) each. What each free e-agent likes to do (`falsification.whims`), by the cars' numbers."""
 
     @property
     def choosing(self) -> list[int]:
@@ -84,7 +75,7 @@ ON_LANE: Final = 1e-6
 """Metres that a start may lie beside the middle of its lane."""
 
 
-class Place(NamedTuple):
+class StartLane(NamedTuple):
     """Where cars may start: start (x, y) and direction (c, s) of a lane's middle, from which to which metre, and its
     number.
     """
@@ -98,14 +89,14 @@ class Place(NamedTuple):
     lane: int
 
 
-class Lots(NamedTuple):
+class LaneStarts(NamedTuple):
     """All places where cars may start, lane by lane.
 
     `first` and `last` are the numbers of the first and the last place of each lane that has any; `ends` the
     intersections at its beginning and end; `near` the places that are near to each square of side `SQUARE`.
     """
 
-    places: list[Place]
+    places: list[StartLane]
     near: dict[tuple[int, int], list[int]]
     first: dict[int, int]
     last: dict[int, int]
@@ -125,9 +116,9 @@ def starts_of(genome: Genome, base: Instance) -> list[Pose]:
 def started(genome: Genome, base: Instance, starts: list[Pose], moved: Mapping[int, Pose]) -> Genome:
     """Return a genome with other starts; the same if one that is moved would be too near to another car."""
     apart = gap_radius(base.problem.car)
-    for car, own in moved.items():
+    for car, start in moved.items():
         for n, pose in enumerate(starts):
-            if n != car and hypot(pose.x - own.x, pose.y - own.y) < apart:
+            if n != car and hypot(pose.x - start.x, pose.y - start.y) < apart:
                 return genome
     return Genome(genome.base, genome.root, {**genome.starts, **moved}, genome.tables, genome.whims)
 
@@ -139,11 +130,11 @@ def span_of(base: Instance, pose: Pose) -> tuple[float, float] | None:
     if spot is None:
         return None
     k, along = spot
-    own = lots.places[k]
-    return min(own.low - along, 0.0), max(own.high - along, 0.0)
+    lot = lots.places[k]
+    return min(lot.low - along, 0.0), max(lot.high - along, 0.0)
 
 
-def spot_of(lots: Lots, pose: Pose) -> tuple[int, float] | None:
+def spot_of(lots: LaneStarts, pose: Pose) -> tuple[int, float] | None:
     """Return in which of the places where cars may start a start is, and after how many metres of its lane."""
     places = lots.places
     for k in lots.near.get(_square(pose.x, pose.y), ()):
@@ -156,41 +147,41 @@ def spot_of(lots: Lots, pose: Pose) -> tuple[int, float] | None:
     return None
 
 
-def pose_at(lots: Lots, place: int, along: float) -> Pose:
+def pose_at(lots: LaneStarts, place: int, along: float) -> Pose:
     """Return the pose in a place where cars may start that is nearest to some metres of its lane."""
     x, y, c, s, low, high, _ = lots.places[place]
     far = min(max(along, low), high)
     return Pose(x + far * c, y + far * s, c, s)
 
 
-def lots_of(base: Instance) -> Lots:
+def lots_of(base: Instance) -> LaneStarts:
     """Return where cars may start on the roads of an instance; kept with the network."""
     problem = base.problem
     key = _FREE, problem.car, problem.intersection_radius, problem.obstacles
-    found = problem.network.known.get(key)
-    if found is None:
+    lots = problem.network.known.get(key)
+    if lots is None:
         ground = Ground(problem.network, problem.car, problem.intersection_radius, problem.obstacles)
         lines, free = areas_of(ground).outside.tables()
         columns = np.column_stack((lines[free.lane], free.low, free.high)).tolist()
         places = [
-            Place(x, y, c, s, low, high, lane)
+            StartLane(x, y, c, s, low, high, lane)
             for (x, y, c, s, low, high), lane in zip(columns, free.lane.tolist(), strict=True)
         ]
         first: dict[int, int] = {}
         last: dict[int, int] = {}
-        for k, own in enumerate(places):
-            first.setdefault(own.lane, k)
-            last[own.lane] = k
+        for k, lot in enumerate(places):
+            first.setdefault(lot.lane, k)
+            last[lot.lane] = k
         ends = {lane: problem.network.lane_ends(lane) for lane in first}
-        found = problem.network.known[key] = Lots(places, _near(places), first, last, ends)
-    return found  # pyright: ignore[reportReturnType]  # what stands under our own key
+        lots = problem.network.known[key] = LaneStarts(places, _near(places), first, last, ends)
+    return lots  # pyright: ignore[reportReturnType]  # what stands under our own key
 
 
 def _square(x: float, y: float) -> tuple[int, int]:
     return floor(x / SQUARE), floor(y / SQUARE)
 
 
-def _near(places: list[Place]) -> dict[tuple[int, int], list[int]]:
+def _near(places: list[StartLane]) -> dict[tuple[int, int], list[int]]:
     """Return the numbers of the places, ascending, that have a part in or beside each square."""
     near: dict[tuple[int, int], list[int]] = {}
     for k, (x, y, c, s, low, high, _) in enumerate(places):
@@ -251,14 +242,14 @@ def _is_free(base: Instance, car: int) -> bool:
 
 
 def _place(
-    genome: Genome, base: Instance, lots: Lots, kind: float, near: float, dice: np.random.Generator
+    genome: Genome, base: Instance, lots: LaneStarts, kind: float, near: float, dice: np.random.Generator
 ) -> tuple[int, float] | None:
     """Return the place where cars may start in which one meets the ego, and metres of its lane; None for none."""
     spot = spot_of(lots, genome.starts.get(EGO, base.starts[EGO]))
     if spot is None:
         return None
-    (places, _, first, last, ends), (own, along) = lots, spot
-    lane = places[own].lane
+    (places, _, first, last, ends), (lot, along) = lots, spot
+    lane = places[lot].lane
     vertex = ends[lane][1]
     if kind < LEAVES:
         end = 1 if kind < COMES else 0
@@ -267,10 +258,10 @@ def _place(
             return None
         arm = arms[int(dice.integers(len(arms)))]
         if kind < COMES:
-            return last[arm], places[last[arm]].high - places[own].high + along + near
+            return last[arm], places[last[arm]].high - places[lot].high + along + near
         return first[arm], places[first[arm]].low + abs(near)
     if kind < LEADS:
-        return own, along + gap_radius(base.problem.car) + abs(near)
+        return lot, along + gap_radius(base.problem.car) + abs(near)
     beside = last.get(lane ^ 1)
     if beside is None:
         return None
@@ -366,5 +357,5 @@ def _with_car(
         if car in genome.whims
         else replace(genome, tables={**genome.tables, car: other.tables[car]})
     )
-    found = started(taken, base, starts, {car: starts[car]})
-    return genome if found is taken else found
+    moved = started(taken, base, starts, {car: starts[car]})
+    return genome if moved is taken else moved

@@ -37,35 +37,26 @@ Bools = npt.NDArray[np.bool_]
 
 @dataclass(frozen=True, slots=True)
 class Passages:
-    """The stretches of some trials, one row each, in order of trial and time.
-
-    Attributes
-    ----------
-    trial : (P,) int64
-        Which of the trials.
-    first, end : (P,) int64
-        Its first frame, and the frame after its last.
-    manoeuvre, degree : (P,) int64
-        What the ego did, and how many roads meet in the disc, or in the one at the end of the road.
-    in_disc : (P,) bool
-        Whether it leads through a disc.
-    disc : (P,) int64
-        The intersection whose disc that is; -1 on roads, and for who has never left the disc.
-    flags : (P,) int64
-        The flags of `rules.propositions` that held of the ego in a frame of the stretch, and `BARRED`.
-    before : (P,) int64
-        The flags of the stretch before, 0 for the first one of a trial.
-    """
+    """The stretches of some trials, one row each, in order of trial and time."""
 
     trial: Ints
+    """Shape (P,). Which of the trials."""
     first: Ints
     end: Ints
+    """`first`, `end`: shape (P,). Its first frame, and the frame after its last."""
     manoeuvre: Ints
     degree: Ints
+    """`manoeuvre`, `degree`: shape (P,). What the ego did, and how many roads meet in the disc, or in the one at the
+    end of the road.
+    """
     in_disc: Bools
+    """Shape (P,). Whether it leads through a disc."""
     disc: Ints
+    """Shape (P,). The intersection whose disc that is; -1 on roads, and for who has never left the disc."""
     flags: Ints
+    """Shape (P,). The flags of `rules.propositions` that held of the ego in a frame of the stretch, and `BARRED`."""
     before: Ints
+    """Shape (P,). The flags of the stretch before, 0 for the first one of a trial."""
 
     def cell(self, rule: str, trial: int, tick: int) -> Cell:
         """Return the cell of a breach of `rule` at a frame of a trial.
@@ -131,8 +122,10 @@ class Passages:
             "3.clear": entered & _held(came, BARRED),
         }
         within = self.manoeuvre * DEGREES + self.degree
-        numbers = [EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[own] for rule, own in tested.items()]
-        places = [self.trial[own] for own in tested.values()]
+        numbers = [
+            EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[rows] for rule, rows in tested.items()
+        ]
+        places = [self.trial[rows] for rows in tested.values()]
         number, trial = np.concatenate(numbers), np.concatenate(places)
         order = np.lexsort((number, trial))
         ends: list[int] = np.searchsorted(trial[order], np.arange(trials + 1)).tolist()
@@ -170,9 +163,9 @@ def find_passages(
     kept = whole.ravel()[place] != OVER
     place, held, ends = place[kept], held[kept], ends[kept]
     trial, first = place // width, place % width
-    own = whole.ravel()[place]
+    lane_of_stretch = whole.ravel()[place]
     ground = _ground(networks)
-    manoeuvre, degree = _manoeuvres(trial, own, held, ground)
+    manoeuvre, degree = _manoeuvres(trial, lane_of_stretch, held, ground)
     fresh = np.append(True, trial[1:] != trial[:-1])
     return Passages(
         trial,
@@ -180,8 +173,8 @@ def find_passages(
         ends - trial * width,
         manoeuvre,
         degree,
-        own < 0,
-        _discs(trial, own, ground),
+        lane_of_stretch < 0,
+        _discs(trial, lane_of_stretch, ground),
         held,
         np.where(fresh, 0, np.roll(held, 1)),
     )
@@ -207,10 +200,10 @@ class _Ground:
 def _ground(networks: Sequence[RoadNetwork]) -> _Ground:
     distinct = {id(network): network for network in networks}
     tables = [_lanes(network) for network in distinct.values()]
-    sizes = np.cumsum([0, *(len(own[0]) for own in tables)])
+    sizes = np.cumsum([0, *(len(table[0]) for table in tables)])
     base = dict(zip(distinct, sizes.tolist(), strict=False))
     place = np.array([base[id(network)] for network in networks])
-    head, tail, into, out_of, tangent = [np.concatenate(own) for own in zip(*tables, strict=True)]
+    head, tail, into, out_of, tangent = [np.concatenate(arrays) for arrays in zip(*tables, strict=True)]
     return _Ground(head, tail, into, out_of, tangent, place)
 
 
@@ -221,15 +214,15 @@ def _held(flags: Ints, wanted: int) -> Bools:
 
 def _lanes(network: RoadNetwork) -> tuple[npt.NDArray[Any], ...]:
     """Return the first columns of `_Ground` for the lanes of a network; they are kept with it."""
-    found = network.known.get(_LANES)
-    if found is None:
+    lanes = network.known.get(_LANES)
+    if lanes is None:
         ends = network.degrees[network.ends]
         head = np.stack([ends[:, 1], ends[:, 0]], axis=1).ravel()
         tail = np.stack([ends[:, 0], ends[:, 1]], axis=1).ravel()
         tangent = np.stack([network.tangents, -network.tangents], axis=1).reshape(-1, 2)
         into, out_of = network.ends[:, ::-1].ravel(), network.ends.ravel()
-        found = network.known[_LANES] = head, tail, into, out_of, tangent
-    return found  # pyright: ignore[reportReturnType]  # what stands under our own key
+        lanes = network.known[_LANES] = head, tail, into, out_of, tangent
+    return lanes  # pyright: ignore[reportReturnType]  # what stands under our own key
 
 
 _LANES = "falsify lanes"
@@ -256,7 +249,7 @@ def _manoeuvres(trial: Ints, lane: Ints, flags: Ints, ground: _Ground) -> tuple[
     """Return manoeuvre and degree of each stretch."""
     came, goes = _neighbours(trial, lane)
     base = ground.base[trial]
-    before, after, own = (np.where(which < 0, 0, which) + base for which in (came, goes, lane))
+    before, after, present = (np.where(which < 0, 0, which) + base for which in (came, goes, lane))
     t0, t1 = ground.tangent[before], ground.tangent[after]
     sine = t0[:, 0] * t1[:, 1] - t0[:, 1] * t1[:, 0]
     ahead = t0[:, 0] * t1[:, 0] + t0[:, 1] * t1[:, 1] > 0.0
@@ -271,6 +264,8 @@ def _manoeuvres(trial: Ints, lane: Ints, flags: Ints, ground: _Ground) -> tuple[
         Manoeuvre.DRIVING,
     )
     in_disc = lane < 0
-    degree = np.where(in_disc, np.where(came >= 0, ground.head[before], ground.tail[after]), ground.head[own])
+    degree = np.where(
+        in_disc, np.where(came >= 0, ground.head[before], ground.tail[after]), ground.head[present]
+    )
     unknown = in_disc & (came < 0) & (goes < 0)
     return np.where(in_disc, through, along), np.where(unknown, 0, degree)

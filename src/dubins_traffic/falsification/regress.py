@@ -23,32 +23,23 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
-    """What a controller did in a case.
-
-    Attributes
-    ----------
-    file : Path
-        The case.
-    case : Case
-        What it was.
-    verdict : str
-        The ruling, or how the trial ended if by a fault.
-    broken : tuple of str
-        The rules that the ego broke before the assumption fell, in order of time, and the formula or goal that the case
-        is about.
-    sentence : str
-        Who did what when; empty if the ego broke nothing.
-    fault : str
-        The end of a trial that ended by a fault and the reason, ``END: REASON``.
-    """
+class CaseOutcome:
+    """What a controller did in a case."""
 
     file: Path
+    """The case."""
     case: Case
+    """What it was."""
     verdict: str
+    """The ruling, or how the trial ended if by a fault."""
     broken: tuple[str, ...]
+    """The rules that the ego broke before the assumption fell, in order of time, and the formula or goal that the
+    case is about.
+    """
     sentence: str
+    """Who did what when; empty if the ego broke nothing."""
     fault: str = ""
+    """The end of a trial that ended by a fault and the reason, ``END: REASON``."""
 
     @property
     def passed(self) -> bool:
@@ -68,7 +59,7 @@ class Outcome:
         }
 
 
-def regress(folder: str | os.PathLike[str], controller: str | Maker | Remote) -> list[Outcome]:
+def regress(folder: str | os.PathLike[str], controller: str | Maker | Remote) -> list[CaseOutcome]:
     """Run every case of a folder with a controller.
 
     Parameters
@@ -91,13 +82,13 @@ def cases_in(folder: str | os.PathLike[str]) -> list[tuple[Path, Case]]:
     place = Path(folder)
     if not place.is_dir():
         raise InputError("no such folder", file=str(place), expected="a folder of cases")
-    found = [(path, read_case(path)) for path in files(place)]
-    if not found:
+    cases = [(path, read_case(path)) for path in files(place)]
+    if not cases:
         raise InputError("no case in it", file=str(place), expected="files *.json that `falsify` wrote")
-    return found
+    return cases
 
 
-def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remote) -> Iterator[Outcome]:
+def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remote) -> Iterator[CaseOutcome]:
     """Run cases with a controller, and yield what it did in each."""
     name, make = name_of(controller), driver_of(controller)
     if not isinstance(make, Remote):
@@ -107,16 +98,18 @@ def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remot
         verdict, ending = judged.score.verdict, judged.record.ending
         if verdict is None:
             raise InputError("is not judged by the rules", file=str(path), field="rules", expected="true")
-        own = [broken for broken in verdict.violations if broken.car == EGO_NAME]
-        own = own if verdict.verdict is Ruling.VIOLATED else []
+        breaches = [broken for broken in verdict.violations if broken.car == EGO_NAME]
+        breaches = breaches if verdict.verdict is Ruling.VIOLATED else []
         if case.story.rule not in EGO_RULES and (asked := judged.breach(case.story.rule)) is not None:
-            own = [*own, asked]
+            breaches = [*breaches, asked]
         fault = ending if ending is not None and ending.end in FAULTS else None
-        said = verdict.verdict.value if fault is None else fault.end.value
-        of_it = [broken for broken in own if broken.rule == case.story.rule] or own
-        told = sentence_of(judged.record, judged.score, of_it[0]) if own else ""
-        yield Outcome(path, case, said, _rules(own), told, "" if fault is None else str(fault))
+        outcome = verdict.verdict.value if fault is None else fault.end.value
+        of_it = [broken for broken in breaches if broken.rule == case.story.rule] or breaches
+        sentence = sentence_of(judged.record, judged.score, of_it[0]) if breaches else ""
+        yield CaseOutcome(
+            path, case, outcome, _rules(breaches), sentence, "" if fault is None else str(fault)
+        )
 
 
-def _rules(own: Sequence[Violation]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys(broken.rule for broken in own))
+def _rules(breaches: Sequence[Violation]) -> tuple[str, ...]:
+    return tuple(dict.fromkeys(broken.rule for broken in breaches))

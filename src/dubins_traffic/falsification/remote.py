@@ -112,23 +112,17 @@ class Remote:
         self.close()
 
     def drive(self, instance: Instance) -> Record:
-        """Run a trial, and return its record.
-
-        Raises
-        ------
-        TransportError
-            If the transport is lost.
-        """
+        """Run a trial, and return its record; TransportError if the transport is lost."""
         self._next = instance
         if self._session is None:
             self._session = self._opened()
         for result in self._session:
             assert result.record is not None
             self._say = quiet
-            found = replace(read(result.record), wall=None, file=None)
+            record = replace(read(result.record), wall=None, file=None)
             remove_record(result.record)
             if result.ending.end is not End.RESET:
-                return found
+                return record
         raise KeyboardInterrupt
 
     def close(self) -> None:

@@ -114,12 +114,12 @@ class Source:
             return instance
         if instance.e_agents is not self._freed[0]:
             self._freed = instance.e_agents, tuple([_freed(agent) for agent in instance.e_agents])
-        own, agents = self._freed
-        return instance if agents == own else replace(instance, e_agents=agents)
+        before, agents = self._freed
+        return instance if agents == before else replace(instance, e_agents=agents)
 
     def forget(self, kept: set[int]) -> None:
         """Forget the instances that have none of the numbers `kept`."""
-        self._known = {number: own for number, own in self._known.items() if number in kept}
+        self._known = {number: instance for number, instance in self._known.items() if number in kept}
 
     def fresh(self, number: int) -> Genome:
         """Return the genome of trial `number` of the configuration, with choices drawn for all cars that can choose.

@@ -33,7 +33,7 @@ from dubins_traffic.falsification.moves import Genome
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.falsification.sampling import DURATION, Source, prepared
 from dubins_traffic.falsification.strategies import Strategy, make
-from dubins_traffic.falsification.trying import DONE, FORMULA, Crew, Tried, crew_of, name_of
+from dubins_traffic.falsification.trying import DONE, FORMULA, Runner, Tried, name_of, runner_of
 from dubins_traffic.logic.formula import propositions
 from dubins_traffic.logic.monitor import Monitors
 from dubins_traffic.logic.parse import parse
@@ -109,7 +109,7 @@ class Least:
         insort(self._kept, _Kept(tried.margins[DONE], number, genome))
         del self._kept[MOST:]
 
-    def cases(self, source: Source, crew: Crew) -> dict[str, Case]:
+    def cases(self, source: Source, crew: Runner) -> dict[str, Case]:
         """Return the trials as cases, by name, judged afresh; without those whose assumption does not hold."""
         found: dict[str, Case] = {}
         for instance in source.build([own.genome for own in self._kept]):
@@ -163,7 +163,7 @@ class Search:
         What is tried next.
     targets : sequence of str
         The rules, and formulas, that are asked for.
-    crew : Crew
+    crew : Runner
         Who runs the trials.
     progress : callable, optional
         Is told of it whenever trials are finished.
@@ -183,7 +183,7 @@ class Search:
         source: Source,
         strategy: Strategy,
         targets: Sequence[str],
-        crew: Crew,
+        crew: Runner,
         progress: Progress | None = None,
     ) -> None:
         self.archive, self.counts = archive, Counts()
@@ -420,7 +420,7 @@ def falsify(
     proposing = make(strategy, source, targets)
     with (
         archives.opened(Path(folder), settings, resume=resume) as archive,
-        crew_of(controller, name, workers, ray) as crew,
+        runner_of(controller, name, workers, ray) as crew,
         heard_between_frames(),
     ):
         search = Search(archive, settings, source, proposing, targets, crew, progress)

@@ -102,8 +102,8 @@ def without_choices(instance: Instance, frames: Frames) -> Iterator[Removal]:  #
             continue
         for name, default in _defaults(agent).items():
             if agent.parameters.get(name) != default:
-                own = replace(agent, parameters={**agent.parameters, name: default})
-                yield f"the {name} of {agent.name}", _with_agent(instance, car, own)
+                usual = replace(agent, parameters={**agent.parameters, name: default})
+                yield f"the {name} of {agent.name}", _with_agent(instance, car, usual)
 
 
 def without_goals(instance: Instance, frames: Frames) -> Iterator[Removal]:  # noqa: ARG001  # a `Way`
@@ -120,9 +120,9 @@ def without_things(instance: Instance, frames: Frames) -> Iterator[Removal]:  # 
     for k in range(len(obstacles)):
         rest = (*obstacles[:k], *obstacles[k + 1 :])
         yield f"obstacle {k}", replace(instance, problem=replace(instance.problem, obstacles=rest))
-    for name, own in Disturbances.model_fields.items():
-        if getattr(instance.disturbances, name) != own.default:
-            undisturbed = instance.disturbances.model_copy(update={name: own.default})
+    for name, model_field in Disturbances.model_fields.items():
+        if getattr(instance.disturbances, name) != model_field.default:
+            undisturbed = instance.disturbances.model_copy(update={name: model_field.default})
             yield f"the {name}", replace(instance, disturbances=undisturbed)
 
 
@@ -199,34 +199,34 @@ def shrink(
     ControllerError
         If that is since the controller ends the trial before.
     """
-    own = case if isinstance(case, Case) else read_case(case)
-    driver = own.story.controller if controller is None else controller
+    begun = case if isinstance(case, Case) else read_case(case)
+    driver = begun.story.controller if controller is None else controller
     make = driver_of(driver)
-    name = driver if isinstance(driver, str) else own.story.controller
-    shrinker = _Shrinker(driver, make, name, own.story.rule)
-    found = confirm(own.instance, own.story.rule, make, name)
-    if found is None:
-        ending = judge(own.instance, make, name).record.ending
+    name = driver if isinstance(driver, str) else begun.story.controller
+    shrinker = _Shrinker(driver, make, name, begun.story.rule)
+    failing = confirm(begun.instance, begun.story.rule, make, name)
+    if failing is None:
+        ending = judge(begun.instance, make, name).record.ending
         if ending is not None and ending.by_controller:
             raise ControllerError(ending.end.value, f"the case ended by a fault: {ending}")
         file = None if isinstance(case, Case) else os.fspath(case)
         raise InputError(
-            "the ego does not break the rule", file=file, field="case.rule", value=own.story.rule,
+            "the ego does not break the rule", file=file, field="case.rule", value=begun.story.rule,
             expected="a case that fails with this controller",
         )  # fmt: skip
-    found = shrinker.shrunk(found, progress)
-    return retold(own.story, name, found)
+    failing = shrinker.shrunk(failing, progress)
+    return retold(begun.story, name, failing)
 
 
-def retold(story: Story, name: str, found: Judged) -> Case:
+def retold(story: Story, name: str, judged: Judged) -> Case:
     """Return a case like one that is known, with what has now been judged of it."""
-    breach = found.breach(story.rule)
+    breach = judged.breach(story.rule)
     if breach is None:
         raise DubinsTrafficError("a case without its breach")
-    told = sentence_of(found.record, found.score, breach)
+    sentence = sentence_of(judged.record, judged.score, breach)
     return Case(
-        replace(found.record.instance, extra={}),
-        replace(story, controller=name, time=breach.time, tick=breach.tick, sentence=told),
+        replace(judged.record.instance, extra={}),
+        replace(story, controller=name, time=breach.time, tick=breach.tick, sentence=sentence),
     )
 
 
@@ -246,30 +246,32 @@ class _Shrinker:
         self._runner = TrialRunner(driver)
         self._make, self._name, self._rule = make, name, rule
 
-    def shrunk(self, found: Judged, progress: Progress | None) -> Judged:
+    def shrunk(self, failing: Judged, progress: Progress | None) -> Judged:
         """Return what is left when nothing more can be taken away."""
         smaller = True
         while smaller:
             smaller = False
             for way in WAYS:
-                while (less := self._less(found, way)) is not None:
-                    what, found = less
+                while (less := self._less(failing, way)) is not None:
+                    what, failing = less
                     smaller = True
                     if progress is not None:
                         progress(what)
-        return found
+        return failing
 
-    def _less(self, found: Judged, way: Way) -> tuple[str, Judged] | None:
+    def _less(self, failing: Judged, way: Way) -> tuple[str, Judged] | None:
         """Return the first instance with one thing less in which the breach stands."""
-        record = found.record
-        tried = [(what, own) for what, own in way(record.instance, record.frames) if _is_sound(own)]
+        record = failing.record
+        tried = [
+            (what, smaller) for what, smaller in way(record.instance, record.frames) if _is_sound(smaller)
+        ]
         if not tried:
             return None
-        findings = in_order(self._runner.attempt([own for _, own in tried]))
-        for (what, own), came in zip(tried, findings, strict=True):
+        findings = in_order(self._runner.attempt([smaller for _, smaller in tried]))
+        for (what, smaller), came in zip(tried, findings, strict=True):
             if any(cell.rule == self._rule for cell, _ in came.cells):
-                again = confirm(own, self._rule, self._make, self._name)
-                if again is not None and self._keeps_lead(again, found):
+                again = confirm(smaller, self._rule, self._make, self._name)
+                if again is not None and self._keeps_lead(again, failing):
                     return what, again
         return None
 

@@ -90,7 +90,7 @@ class Particle:
 
     def branched(self, checkpoint: int, seed: int) -> Particle:
         """Return the particle that goes on from another seed at a checkpoint."""
-        before = [own for own in self.seeds if own[0] < checkpoint]
+        before = [drawn for drawn in self.seeds if drawn[0] < checkpoint]
         return Particle(self.first, (*before, (checkpoint, seed)))
 
     def seed_at(self, checkpoint: int) -> int:
@@ -107,29 +107,21 @@ class Paths(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Split:
-    """What one run of the algorithm gives.
-
-    Attributes
-    ----------
-    probability : float
-        The estimate.
-    trials : int
-        How many trials it took.
-    counted : int
-        In how many of the first particles, which are independent trials, the event happened.
-    branches, repeated : int
-        How many particles were branched off; how many of them came to the margin of their parents, to the bit: nothing
-        was left to chance where they branched off.
-    levels : tuple of float
-        The scores at which particles were given up.
-    """
+    """What one run of the algorithm gives."""
 
     probability: float
+    """The estimate."""
     trials: int
+    """How many trials it took."""
     counted: int
+    """In how many of the first particles, which are independent trials, the event happened."""
     branches: int
     repeated: int
+    """`branches`, `repeated`: how many particles were branched off; how many of them came to the margin of their
+    parents, to the bit: nothing was left to chance where they branched off.
+    """
     levels: tuple[float, ...]
+    """The scores at which particles were given up."""
 
 
 class Run:
@@ -137,10 +129,6 @@ class Run:
 
     Parameters
     ----------
-    particles : list of Particle
-        The first ones.
-    paths : Paths
-        What came of them.
     below : float
         The margin that is rare.
     dice : Generator
@@ -178,11 +166,11 @@ class Run:
         self._children = [self._particles[parent].branched(point, seed) for parent, point, seed in drawn]
         return self._children
 
-    def replace(self, found: Paths) -> None:
-        """Put the children in the places of what was given up; `found` is what came of them."""
+    def replace(self, followed: Paths) -> None:
+        """Put the children in the places of what was given up; `followed` is what came of them."""
         self._branches += len(self._lost)
-        self._repeated += int((found.margins == self._paths.margins[self._parents]).sum())
-        self._paths.scores[self._lost], self._paths.margins[self._lost] = found
+        self._repeated += int((followed.margins == self._paths.margins[self._parents]).sum())
+        self._paths.scores[self._lost], self._paths.margins[self._lost] = followed
         for place, child in zip(self._lost.tolist(), self._children, strict=True):
             self._particles[place] = child
 
@@ -221,14 +209,14 @@ def split(
     progress : callable
         Is told how many trials have run.
     """
-    company, ticks, seeds = begin(instances), instances[0].ticks, [own.seed for own in instances]
+    company, ticks, seeds = begin(instances), instances[0].ticks, [instance.seed for instance in instances]
     every, each = max(1, ticks // CHECKPOINTS), len(instances) // len(dice)
     first = [Particle(k, ((0, seed),)) for k, seed in enumerate(seeds)]
     paths = follow(first, company, seeds, every, ticks)
     runs: list[Run] = []
-    for k, own in enumerate(dice):
+    for k, generator in enumerate(dice):
         mine = slice(k * each, (k + 1) * each)
-        runs.append(Run(first[mine], Paths(paths.scores[mine], paths.margins[mine]), below, own))
+        runs.append(Run(first[mine], Paths(paths.scores[mine], paths.margins[mine]), below, generator))
     done = len(first)
     going = [(run, found) for run in runs if (found := run.children())]
     while going:
@@ -252,12 +240,12 @@ def follow(
 
     Checkpoint 0 is the first frame, and there is one every `every` ticks, the last at the end.
     """
-    running = company.fork([own.first for own in particles])
-    found = [running.levels()]
-    present = [seeds[own.first] for own in particles]
+    running = company.fork([particle.first for particle in particles])
+    levels = [running.levels()]
+    present = [seeds[particle.first] for particle in particles]
     done = checkpoint = 0
     while done < ticks:
-        wanted = [own.seed_at(checkpoint) for own in particles]
+        wanted = [particle.seed_at(checkpoint) for particle in particles]
         if wanted != present:
             running.reseed(wanted)
             present = wanted
@@ -265,8 +253,8 @@ def follow(
         running.advance(step)
         done += step
         checkpoint += 1
-        found.append(running.levels())
-    return Paths(np.minimum.accumulate(np.stack(found, axis=1), axis=1), running.margins())
+        levels.append(running.levels())
+    return Paths(np.minimum.accumulate(np.stack(levels, axis=1), axis=1), running.margins())
 
 
 COLUMNS: Final = {"1.road": "road", "2.left": "line", "2.return": "back", "2.turn": "turn"}
@@ -279,13 +267,11 @@ HASTE: Final = 0.05
 """Metres by which a gap counts as wider for each second until then."""
 
 
-class Watched:
+class MeasuredGroup:
     """A group of trials and the least margin of one rule that each has had.
 
     Parameters
     ----------
-    group : Group
-        The trials; of one control rate.
     rule : str
         One of `MEASURED`.
     """
@@ -312,19 +298,16 @@ class Watched:
     def advance(self, ticks: int) -> None:
         """Take all trials some ticks farther.
 
-        Raises
-        ------
-        ControllerError
-            If one of them ends by a fault: then there is no estimate.
+        ControllerError if one of them ends by a fault: then there is no estimate.
         """
         self.group.drive(ticks)
         for instance, ending in zip(self.group.instances, self.group.endings, strict=True):
             if ending is not None and ending.end in FAULTS:
                 raise ControllerError(ending.end.value, f"{instance.title} ended by a fault ({ending})")
 
-    def fork(self, trials: Sequence[int]) -> Watched:
+    def fork(self, trials: Sequence[int]) -> MeasuredGroup:
         """Return independent copies of some trials, each with a copy of its controller."""
-        return Watched(self.group.fork(trials), self.rule)
+        return MeasuredGroup(self.group.fork(trials), self.rule)
 
     def reseed(self, seeds: Sequence[int]) -> None:
         """Let each trial go on from another seed."""
@@ -339,7 +322,9 @@ def coming(group: Group) -> Floats:
     """
     state, reach = group.state, group.world.cars.reach
     x, y = (array[:, 1:] - array[:, :1] for array in (state.x, state.y))
-    vx, vy = (own[:, 1:] - own[:, :1] for own in (state.speed * state.c, state.speed * state.s))
+    vx, vy = (
+        velocity[:, 1:] - velocity[:, :1] for velocity in (state.speed * state.c, state.speed * state.s)
+    )
     places: int = state.x.shape[1]
     absent = np.arange(1, places) >= state.count[:, None]
     least = np.full(len(x), np.inf)
@@ -358,7 +343,7 @@ def beginner(controller: str | Maker, rule: str) -> Begin:
         raise InputError("has no margin that can be watched", file="--event", value=rule, expected=expected)
     egos = Egos(controller, apart=True)
 
-    def begin(instances: Sequence[Instance]) -> Watched:
+    def begin(instances: Sequence[Instance]) -> MeasuredGroup:
         ways = egos.ways(instances)
         if not all(map(can_share, instances)) or len(grouped(instances)) != 1:
             raise InputError(
@@ -366,6 +351,6 @@ def beginner(controller: str | Maker, rule: str) -> Begin:
                 expected="the embedded simulator, no formulas, no cars of one's own or elsewhere, one control rate",
             )  # fmt: skip
         way = Way.COMPILED if len(ways[Way.COMPILED]) == len(instances) else Way.ASKED
-        return Watched(egos.group(instances, way), rule)
+        return MeasuredGroup(egos.group(instances, way), rule)
 
     return begin

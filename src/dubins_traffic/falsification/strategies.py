@@ -94,17 +94,17 @@ class Evolution:
         kept = self._kept()
         self._source.forget({genome.base for genome in kept})
         self._source.draw([number for number in numbers if number not in parents])
-        found: list[Genome] = []
+        proposed: list[Genome] = []
         for number in numbers:
             parent, dice = parents.get(number), self._source.dice(number, Stream.CHANGES)
             if parent is None and dice.random() < ARRANGED:
-                found.append(self._source.arranged(number, dice))
+                proposed.append(self._source.arranged(number, dice))
             elif parent is None:
-                found.append(self._source.fresh(number))
+                proposed.append(self._source.fresh(number))
             else:
                 mate = kept[int(dice.integers(len(kept)))]
-                found.append(self._source.varied(parent, mate, dice))
-        return found
+                proposed.append(self._source.varied(parent, mate, dice))
+        return proposed
 
     def tell(self, number: int, genome: Genome, tried: Tried, known: bool) -> None:
         """Keep a trial for the targets to which it came near, and for the situations in it that are rare."""
@@ -121,14 +121,14 @@ class Evolution:
         if len(self._rare) > 2 * RARE:
             rarest = sorted(self._rare, key=self._rank)[:RARE]
             self._rare = {situation: self._rare[situation] for situation in rarest}
-        for own in self._targets:
-            nearer = self._take(own, genome, tried.margins.get(own))
-            self._idle[own] = 0 if nearer else self._idle[own] + (own == target)
-            if own == target and not nearer and root in self._lines[own]:
-                line = self._lines[own][root]
+        for each in self._targets:
+            nearer = self._take(each, genome, tried.margins.get(each))
+            self._idle[each] = 0 if nearer else self._idle[each] + (each == target)
+            if each == target and not nearer and root in self._lines[each]:
+                line = self._lines[each][root]
                 line.failed += 1
                 if line.failed >= self._patience:
-                    self._give_up(own, root)
+                    self._give_up(each, root)
 
     def _rank(self, situation: int) -> tuple[int, int]:
         return self._often[situation], situation
@@ -156,7 +156,7 @@ class Evolution:
         return self._rare[ranked[int(len(ranked) * dice.random() ** PRESSURE)]] if ranked else None
 
     def _kept(self) -> list[Genome]:
-        lines = [line.genome for own in self._lines.values() for line in own.values()]
+        lines = [line.genome for family in self._lines.values() for line in family.values()]
         return [*lines, *self._rare.values()]
 
     def _take(self, target: str, genome: Genome, margin: float | None) -> bool:
@@ -174,7 +174,7 @@ class Evolution:
         if len(lines) == self._most_lines:
             worst = self._worst.get(target)
             if worst is None:
-                worst = self._worst[target] = max(lines, key=lambda own: (lines[own].margin, own))
+                worst = self._worst[target] = max(lines, key=lambda each: (lines[each].margin, each))
             if margin >= lines[worst].margin:
                 return False
             del lines[worst]
@@ -191,10 +191,10 @@ class Evolution:
         """Return all that is kept."""
         return {
             "lines": {
-                target: {str(root): line.to_json() for root, line in own.items()}
-                for target, own in self._lines.items()
+                target: {str(root): line.to_json() for root, line in family.items()}
+                for target, family in self._lines.items()
             },
-            "given_up": {target: sorted(own) for target, own in self._given_up.items()},
+            "given_up": {target: sorted(roots) for target, roots in self._given_up.items()},
             "idle": self._idle,
             "often": sorted(self._often.items()),
             "rare": [[situation, genome.to_json()] for situation, genome in self._rare.items()],
@@ -202,12 +202,12 @@ class Evolution:
 
     def restore(self, state: Any) -> None:
         """Take over what was kept."""
-        for target, own in state["lines"].items():
+        for target, written in state["lines"].items():
             self._lines[target] = {
                 int(root): Line(margin, Genome.from_json(genome), failed)
-                for root, (margin, genome, failed) in own.items()
+                for root, (margin, genome, failed) in written.items()
             }
-        self._given_up = {target: set(own) for target, own in state["given_up"].items()}
+        self._given_up = {target: set(roots) for target, roots in state["given_up"].items()}
         self._idle = dict(state["idle"])
         self._often = dict(state["often"])
         self._rare = {situation: Genome.from_json(genome) for situation, genome in state["rare"]}
@@ -224,12 +224,8 @@ class Cma:
 
     It begins anew, with another drawn trial, where it has converged or found a failure.
 
-    Source: N. Hansen, "The CMA evolution strategy: a tutorial", arXiv:1604.00772.
-
-    Raises
-    ------
-    MissingExtraError
-        Without the extra `falsify`.
+    Source: N. Hansen, "The CMA evolution strategy: a tutorial", arXiv:1604.00772. MissingExtraError without the extra
+    `falsify`.
     """
 
     def __init__(self, source: Source, targets: Sequence[str]) -> None:
@@ -249,7 +245,7 @@ class Cma:
         target = self._target()
         if target not in self._climbs:
             self._climbs[target] = _Climb(self._cma, self._source, numbers[0])
-        self._source.forget({own.base for own in self._climbs.values()})
+        self._source.forget({climb.base for climb in self._climbs.values()})
         return self._climbs[target].ask(len(numbers))
 
     def tell(self, number: int, genome: Genome, tried: Tried, known: bool) -> None:  # noqa: ARG002  # as all strategies

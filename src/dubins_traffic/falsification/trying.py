@@ -17,15 +17,14 @@ from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.engine.controlled import Maker
 from dubins_traffic.engine.egos import Egos, Way, grouped
 from dubins_traffic.errors import InputError, WorkerLostError
-from dubins_traffic.falsification.contract import Kept, kept, spare
+from dubins_traffic.falsification.contract import ContractMargins, contract_margins, spare
 from dubins_traffic.falsification.coverage import Cell, Manoeuvre
 from dubins_traffic.falsification.passages import Passages, find_passages
 from dubins_traffic.falsification.remote import Remote
 from dubins_traffic.record.reader import Record, replay
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.runs.crew import Cancelled, carry_out
-from dubins_traffic.runs.crew import Crew as Workers
+from dubins_traffic.runs.crew import Cancelled, Crew, carry_out
 from dubins_traffic.scoring.margins import LIVENESS
 from dubins_traffic.scoring.score import Score, score
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES, Ruling
@@ -49,38 +48,32 @@ MOST: Final = 256
 
 @dataclass(frozen=True, slots=True)
 class Tried:
-    """What a search keeps of a trial.
-
-    Attributes
-    ----------
-    discarded : bool
-        Whether the e-agents broke the assumption before the ego broke anything: then the trial says nothing of the ego.
-    faulty : bool
-        Whether it ended by a fault.
-    margins : dict
-        How far the ego stayed from breaking each rule, by the rules' names, and of each formula of the problem's own
-        ("formula NAME"), and in seconds the longest gap of a goal from its limit (`LIVENESS`); what nothing could break
-        is left out; and those of the contract (`contract.Kept`). Negative: broken. `DONE`: what the ego got done,
-        rounds, then the share of the goals visited, then metres.
-    cells : tuple of (Cell, int)
-        The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame;
-        and the frames in which the contract was broken, of discarded trials too.
-    situations : tuple of int
-        What it met with (`passages.Passages.situations`); empty where nobody asks for it.
-    fault : str
-        The end of a faulty trial and the reason, ``END: REASON``.
-    exercised : tuple of int
-        The numbers of the cells that it put to the test, each as often as it did; none if it ended by a fault, or
-        where nobody asks for it.
-    """
+    """What a search keeps of a trial."""
 
     discarded: bool
+    """Whether the e-agents broke the assumption before the ego broke anything: then the trial says nothing of the
+    ego.
+    """
     faulty: bool
+    """Whether it ended by a fault."""
     margins: dict[str, float]
+    """How far the ego stayed from breaking each rule, by the rules' names, and of each formula of the problem's own
+    ("formula NAME"), and in seconds the longest gap of a goal from its limit (`LIVENESS`); what nothing could break
+    is left out; and those of the contract (`contract.Kept`). Negative: broken. `DONE`: what the ego got done,
+    rounds, then the share of the goals visited, then metres.
+    """
     cells: tuple[tuple[Cell, int], ...]
+    """The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame; and
+    the frames in which the contract was broken, of discarded trials too.
+    """
     situations: tuple[int, ...] = ()
+    """What it met with (`passages.Passages.situations`); empty where nobody asks for it."""
     fault: str = ""
+    """The end of a faulty trial and the reason, ``END: REASON``."""
     exercised: tuple[int, ...] = ()
+    """The numbers of the cells that it put to the test, each as often as it did; none if it ended by a fault, or
+    where nobody asks for it.
+    """
 
     def to_json(self) -> dict[str, Any]:
         """Return it as a JSON object, from which `from_json` makes an equal one."""
@@ -95,8 +88,8 @@ class Tried:
             for rule, manoeuvre, degree, tick in document["cells"]
         )
         numbers = {name: tuple(document[name]) for name in ("situations", "exercised")}
-        own: dict[str, Any] = {**document, "cells": cells, **numbers}
-        return Tried(**own)
+        values: dict[str, Any] = {**document, "cells": cells, **numbers}
+        return Tried(**values)
 
 
 class TrialRunner:
@@ -130,41 +123,36 @@ class TrialRunner:
         """Run the trials of instances; yield what came of some, by their places in `instances`, as they end.
 
         What runs without asking anybody in Python runs together, and so does what one controller drives; else no more
-        trials than `fitting` says.
-
-        Raises
-        ------
-        KeyboardInterrupt
-            When it is cancelled.
+        trials than `fitting` says. KeyboardInterrupt when it is cancelled.
         """
-        places = {id(own): k for k, own in enumerate(instances)}
+        places = {id(instance): k for k, instance in enumerate(instances)}
         ways = {Way.ALONE: list(instances)} if self._remote is not None else self._egos.ways(instances)
-        for own in grouped(ways.get(Way.COMPILED, ())):
+        for alike in grouped(ways.get(Way.COMPILED, ())):
             self.answer_s = 0.0
-            yield self._together(own, Way.COMPILED, places)
-        for own in grouped(ways.get(Way.ASKED, ())):
+            yield self._together(alike, Way.COMPILED, places)
+        for alike in grouped(ways.get(Way.ASKED, ())):
             first = 0
-            while first < len(own):
-                some = own[first : first + self._count(own[first:])]
+            while first < len(alike):
+                some = alike[first : first + self._count(alike[first:])]
                 yield self._together(some, Way.ASKED, places)
                 first += len(some)
-        for own in ways[Way.ALONE]:
+        for instance in ways[Way.ALONE]:
             self._check()
-            yield {places[id(own)]: self._alone(own)}
+            yield {places[id(instance)]: self._alone(instance)}
 
     def _count(self, instances: Sequence[Instance]) -> int:
         """Return how many of some trials whose controllers are asked in every tick run together."""
         most = min(self._most, len(instances))
         if self._is_shared:
             return most
-        return fitting(self.answer_s, max(own.ticks for own in instances), most)
+        return fitting(self.answer_s, max(instance.ticks for instance in instances), most)
 
     def _note(self, summaries: Iterable[Mapping[str, float]]) -> None:
         """Note how long the controller took for an answer in trials, by the summaries of their latencies.
 
         Trials in which it was never asked, since its start failed, tell nothing of that.
         """
-        means = [own["mean"] for own in summaries if own]
+        means = [summary["mean"] for summary in summaries if summary]
         if means:
             self.answer_s = sum(means) / len(means)
 
@@ -185,18 +173,21 @@ class TrialRunner:
         outcomes = group.fresh(self._egos.name)
         self._note(outcome.act_s for outcome in outcomes)
         frames = np.array([outcome.ending.ticks + 1 for outcome in outcomes])
-        networks = [own.problem.network for own in group.instances]
+        networks = [instance.problem.network for instance in group.instances]
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
-        tried = [tried_of(own.score, own.ending, passages, b, own.instance) for b, own in enumerate(outcomes)]
+        tried = [
+            tried_of(outcome.score, outcome.ending, passages, b, outcome.instance)
+            for b, outcome in enumerate(outcomes)
+        ]
         whole = with_passages(tried, passages, group.instances[0])
-        return {places[id(own.instance)]: came for own, came in zip(outcomes, whole, strict=True)}
+        return {places[id(outcome.instance)]: came for outcome, came in zip(outcomes, whole, strict=True)}
 
     def _alone(self, instance: Instance) -> Tried:
         """Run a trial that can't be stepped with others."""
         if self._remote is not None:
             record = self._remote.drive(instance)
-            found, passages = judged_record(record)
-            return _tried_alone(instance, found, record.ending, passages)
+            scored, passages = judged_record(record)
+            return _tried_alone(instance, scored, record.ending, passages)
         ego = EgoTrace()
         result = self._egos.alone(instance, sinks=[ego])
         self._note([result.wall.act_s])
@@ -240,7 +231,9 @@ def tried_of(
     verdict = score.verdict
     fault = str(ending) if ending is not None and ending.end in FAULTS else ""
     margins = {
-        f"{FORMULA} {own.name}": own.robustness for own in score.formulas if own.robustness is not None
+        f"{FORMULA} {formula.name}": formula.robustness
+        for formula in score.formulas
+        if formula.robustness is not None
     }
     margins[DONE] = score.counted_rounds + score.goals_visited + METRE * score.driven.distance_m
     if verdict is None:
@@ -248,8 +241,10 @@ def tried_of(
     margins |= {rule: value for rule, value in verdict.robustness.items() if value is not None}
     late = spare(instance.problem, verdict, ending)
     margins |= {} if late is None else {LIVENESS: late}
-    own = [broken for broken in verdict.violations if broken.car == EGO_NAME and broken.rule in EGO_RULES]
-    first = {broken.rule: broken.tick for broken in reversed(own)}
+    breaches = [
+        broken for broken in verdict.violations if broken.car == EGO_NAME and broken.rule in EGO_RULES
+    ]
+    first = {broken.rule: broken.tick for broken in reversed(breaches)}
     for rule in first:
         margins[rule] = min(margins.get(rule, -0.0), BROKEN)
     assumption_broken = verdict.assumption_broken
@@ -257,8 +252,8 @@ def tried_of(
         rate = instance.problem.rate
         first |= {rule: round(time * rate) for rule, time in broken_formulas(score).items()}
         first |= {LIVENESS: ending.ticks} if ending is not None and late is not None and late < 0.0 else {}
-    discarded = verdict.verdict is Ruling.EXCUSED or (not own and assumption_broken)
-    contract = Kept() if fault else kept(verdict, passages, trial, instance)
+    discarded = verdict.verdict is Ruling.EXCUSED or (not breaches and assumption_broken)
+    contract = ContractMargins() if fault else contract_margins(verdict, passages, trial, instance)
     margins |= contract.margins
     first = contract.frames if discarded else first | contract.frames
     ordered = sorted(first.items(), key=lambda item: (item[1], item[0]))
@@ -266,9 +261,9 @@ def tried_of(
     return Tried(discarded, bool(fault), margins, cells, fault=fault)
 
 
-def _tried_alone(instance: Instance, found: Score, ending: Ending | None, passages: Passages) -> Tried:
+def _tried_alone(instance: Instance, scored: Score, ending: Ending | None, passages: Passages) -> Tried:
     """Return what came of a trial that was run alone."""
-    tried = tried_of(found, ending, passages, 0, instance)
+    tried = tried_of(scored, ending, passages, 0, instance)
     return with_passages([tried], passages, instance)[0]
 
 
@@ -280,40 +275,34 @@ def with_passages(tried: Sequence[Tried], passages: Passages, instance: Instance
     degree = RuleParameters.from_mapping(instance.problem.rules).crossing_degree
     met, tested = passages.situations(len(tried)), passages.exercised(len(tried), degree)
     return [
-        replace(own, situations=met[b], exercised=() if own.faulty else tested[b])
-        for b, own in enumerate(tried)
+        replace(each, situations=met[b], exercised=() if each.faulty else tested[b])
+        for b, each in enumerate(tried)
     ]
 
 
 def in_order(parts: Iterable[Mapping[int, Tried]]) -> list[Tried]:
     """Return what came of trials in the order of their instances, of which `parts` have some each."""
-    found = {k: own for part in parts for k, own in part.items()}
-    return [found[k] for k in range(len(found))]
+    by_place = {k: each for part in parts for k, each in part.items()}
+    return [by_place[k] for k in range(len(by_place))]
 
 
 def broken_formulas(score: Score) -> dict[str, float]:
     """Return the seconds at which the problem's own formulas became false, by what a search calls them."""
-    false = [own for own in score.formulas if own.verdict == "false"]
-    return {f"{FORMULA} {own.name}": own.time for own in false if own.time is not None}
+    false = [formula for formula in score.formulas if formula.verdict == "false"]
+    return {f"{FORMULA} {formula.name}": formula.time for formula in false if formula.time is not None}
 
 
 MOST_IN_CHUNK: Final = 32
 """Most trials that a worker is handed at a time."""
 
 
-class Crew(Protocol):
-    """Runs the trials of a search.
-
-    Attributes
-    ----------
-    make : callable or Remote
-        Makes the controller, or drives trials elsewhere.
-    name : str
-        What records and cases call it.
-    """
+class Runner(Protocol):
+    """Runs the trials of a search."""
 
     make: Maker | Remote
+    """Makes the controller, or drives trials elsewhere."""
     name: str
+    """What records and cases call it."""
 
     def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
         """Run the trials of instances; yield what came of some, by their places in `instances`, as they end.
@@ -360,7 +349,7 @@ _runners: dict[str, TrialRunner] = {}
 class PoolRunner:
     """Hands chunks of trials to workers."""
 
-    def __init__(self, controller: str, workers: Workers) -> None:
+    def __init__(self, controller: str, workers: Crew) -> None:
         controllers.load(controller)
         self.make: Maker | Remote = maker(controller)
         self.name = controller
@@ -370,11 +359,11 @@ class PoolRunner:
 
     def run(self, instances: Sequence[Instance]) -> Iterator[dict[int, Tried]]:
         """Run the trials of instances, some at a time; a chunk whose worker ends is run again, a few times."""
-        for chunk, found in carry_out(self._workers, self._chunks(instances)):
-            if found is None:
+        for chunk, answer in carry_out(self._workers, self._chunks(instances)):
+            if answer is None:
                 raise WorkerLostError(f"workers end in the middle of trials: {self.name} may end its process")
-            tried: list[Tried] = found[0]
-            self._answer_s = found[1]
+            tried: list[Tried] = answer[0]
+            self._answer_s = answer[1]
             yield dict(enumerate(tried, chunk.first))
 
     def _chunks(self, instances: Sequence[Instance]) -> Iterator[TrialChunk]:
@@ -382,7 +371,7 @@ class PoolRunner:
         first = 0
         while first < len(instances):
             rest = instances[first : first + MOST_IN_CHUNK]
-            some = rest[: fitting(self._answer_s, max(own.ticks for own in rest), len(rest))]
+            some = rest[: fitting(self._answer_s, max(instance.ticks for instance in rest), len(rest))]
             yield TrialChunk(self._number, self.name, first, tuple(some))
             self._number += 1
             first += len(some)
@@ -408,7 +397,9 @@ def name_of(controller: str | Maker | Remote) -> str:
 
 
 @contextlib.contextmanager
-def crew_of(controller: str | Maker | Remote, name: str, workers: int, ray: str | None) -> Generator[Crew]:
+def runner_of(
+    controller: str | Maker | Remote, name: str, workers: int, ray: str | None
+) -> Generator[Runner]:
     """Yield who runs the trials of a search with a controller: `workers` processes, or a Ray cluster at an address."""
     if workers == 1 and ray is None:
         yield LocalRunner(controller, name)

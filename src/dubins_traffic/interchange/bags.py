@@ -57,10 +57,7 @@ Sample = tuple[float, ...]
 def typestore() -> Any:
     """Return the message types of ROS 1 together with those of this package.
 
-    Raises
-    ------
-    MissingExtraError
-        Without the extra `ros1`.
+    MissingExtraError without the extra `ros1`.
     """
     try:
         types = import_module("rosbags.typesys")

@@ -119,7 +119,7 @@ def _refused(k: int, problem: str, expected: str) -> InputError:
     return InputError(
         f"the obstacle {problem}",
         field=f"obstacles[{k}]",
-        expected=f"{expected}, or rules: false (docs/rules.md#room)",
+        expected=f"{expected}, or rules: false (dubins-traffic explain room)",
     )
 
 

@@ -47,7 +47,7 @@ def check_demands(
             "the rules are not defined here: sees too little",
             field="sensing_radius",
             value=sensing_radius,
-            expected=f"at least {sight:.6g} m, or rules: false (docs/rules.md#room)",
+            expected=f"at least {sight:.6g} m, or rules: false (dubins-traffic explain room)",
         )
     faults = clearance_faults(network, radius, reach, car.w, rules["segment_slack"])
     if faults:
@@ -59,7 +59,7 @@ def check_demands(
             f"the rules are not defined here: {first.problem}{more}",
             field=first.field,
             value=first.value,
-            expected=f"{first.expected}, or rules: false (docs/rules.md#room)",
+            expected=f"{first.expected}, or rules: false (dubins-traffic explain room)",
         )
         raise error.within(field=None if first.field == "intersection_radius" else "rnd")
 

@@ -15,3 +15,8 @@ def clause(rule: str) -> str:
     ``E6``) is the anchor of its clause.
     """
     return f"{PAGE}#{rule}"
+
+
+def explain(rule: str) -> str:
+    """Return the command that prints the clause of a rule, as messages name it."""
+    return f"dubins-traffic explain {rule}"

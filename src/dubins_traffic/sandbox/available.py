@@ -22,11 +22,11 @@ WAIT: Final = 60.0
 def available_layers() -> Layers:
     """Return the layers that hold on this machine for this user."""
     why = _why_no_box()
-    found = cgroups.trees().folders
+    folders = cgroups.trees().folders
     absent = [
         name
         for name, tree in ((MEMORY, "memory"), (PROCESSES, "pids"), (CLOCK, "cpuacct"))
-        if tree not in found
+        if tree not in folders
     ]
     if seccomp.binding() is None:
         absent.append(SECCOMP)
@@ -75,5 +75,5 @@ def _why_no_box() -> str:
         )
     except (OSError, subprocess.TimeoutExpired) as error:
         return shown(str(error), 200)
-    said = done.stderr.decode(errors="replace").strip().splitlines()
-    return "" if done.returncode == 0 else shown(said[-1] if said else f"status {done.returncode}", 200)
+    lines = done.stderr.decode(errors="replace").strip().splitlines()
+    return "" if done.returncode == 0 else shown(lines[-1] if lines else f"status {done.returncode}", 200)

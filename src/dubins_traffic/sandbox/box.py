@@ -32,8 +32,8 @@ class Printed:
         """Take more."""
         self._kept += data
         if not self.stands:
-            _, found, rest = self._kept.partition(_STANDS)
-            if not found:
+            _, stands, rest = self._kept.partition(_STANDS)
+            if not stands:
                 return
             self.stands, self._kept, data = True, bytearray(rest), bytes(rest)
         self.count += len(data)
@@ -75,15 +75,6 @@ class Box:
     """A program in a box, for one trial. It is begun at once and ends with `close`, or when this process does.
 
     A box ends with the thread that began it, too: the kernel kills it then.
-
-    Parameters
-    ----------
-    program : Program
-        What runs in it.
-    limits : Limits
-        What it may use.
-    layers : Layers
-        Which layers it has.
 
     Attributes
     ----------
@@ -189,11 +180,11 @@ class Box:
         """Wait a little for something to read; return whether there is something of an answer."""
         if writing:
             self._poll.register(self._processes.questions, select.POLLOUT)
-        found = self._poll.poll(LOOK * 1000.0)
+        ready = self._poll.poll(LOOK * 1000.0)
         if writing:
             self._poll.unregister(self._processes.questions)
         answer = False
-        for descriptor, _ in found:
+        for descriptor, _ in ready:
             if descriptor == self._processes.answers:
                 answer = True
             elif descriptor == self._processes.printed:
@@ -209,10 +200,10 @@ class Box:
         if not data:
             raise self._gone()
         self._said += data
-        line, found, rest = self._said.partition(b"\n")
+        line, has_line, rest = self._said.partition(b"\n")
         if len(line) > LONGEST:
             raise self.fault(End.PEER_GARBAGE, f"a line longer than {LONGEST} bytes")
-        if not found:
+        if not has_line:
             return None
         if rest:
             raise self.fault(End.PEER_FLOOD, "it said more than it was asked")

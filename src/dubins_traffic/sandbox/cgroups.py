@@ -39,29 +39,16 @@ class Trees:
 @cache
 def trees() -> Trees:
     """Return where this process can make groups, and sweep what those have left who were killed."""
-    found = _first_version()
+    first = _first_version()
     second = _second_version()
-    best = second if len(second.folders) > len(found.folders) else found
+    best = second if len(second.folders) > len(first.folders) else first
     for folder in set(best.folders.values()):
         _sweep(folder)
     return best
 
 
 class Group:
-    """The control group of one box.
-
-    Parameters
-    ----------
-    where : Trees
-        Where it is made.
-    limits : Limits
-        Its memory and processes.
-
-    Raises
-    ------
-    OSError
-        If it can't be made after all.
-    """
+    """The control group of one box; OSError if it can't be made after all."""
 
     def __init__(self, where: Trees, limits: Limits) -> None:
         name = f"{NAME}-{os.getpid()}-{next(_numbers)}"
@@ -135,7 +122,7 @@ OWN: Final = 4
 
 
 def _first_version() -> Trees:
-    found: dict[str, Path] = {}
+    folders: dict[str, Path] = {}
     for line in _lines("/proc/self/cgroup"):
         number, names, path = line.split(":", 2)
         if number == "0":
@@ -145,16 +132,18 @@ def _first_version() -> Trees:
             inside = root / path.lstrip("/")
             base = inside if inside.is_dir() else root
             if name in TREES and _can_make(base):
-                found[name] = base
-    return Trees(1, found)
+                folders[name] = base
+    return Trees(1, folders)
 
 
 def _second_version() -> Trees:
     root = Path("/sys/fs/cgroup")
-    own = next((line.split(":", 2)[2] for line in _lines("/proc/self/cgroup") if line.startswith("0:")), None)
-    if own is None or not (root / "cgroup.controllers").is_file():
+    path = next(
+        (line.split(":", 2)[2] for line in _lines("/proc/self/cgroup") if line.startswith("0:")), None
+    )
+    if path is None or not (root / "cgroup.controllers").is_file():
         return Trees(2)
-    here = root / own.lstrip("/")
+    here = root / path.lstrip("/")
     for folder in (here, here.parent):
         if root not in (folder, *folder.parents) or not _can_make(folder):
             continue

@@ -35,15 +35,6 @@ TRUST: Final = "trust"
 class BoxedController:
     """Drives by a program in a box, a new one for each trial (a `protocols.Controller`).
 
-    Parameters
-    ----------
-    program : Program
-        What drives.
-    limits : Limits
-        What it may use in a trial.
-    layers : Layers
-        The layers of its boxes.
-
     Attributes
     ----------
     end : BoxEnd or None
@@ -163,8 +154,6 @@ def boxed_controller(
     ----------
     path : str
         What drives; see `submission.program_of`.
-    limits : Limits, optional
-        What it may use in a trial.
     trust : bool
         Whether it may drive where this machine can't enforce all limits, with those that it can.
     layers : Layers, optional
@@ -187,10 +176,7 @@ def boxed_controller(
 def named(path: str, text: str) -> BoxedController:
     """Return a controller in a box as a name tells: what drives, and its limits, ``trust`` perhaps among them.
 
-    Raises
-    ------
-    InputError
-        As `boxed_controller`, and if there is no such limit.
+    InputError as `boxed_controller`, and if there is no such limit.
     """
     parts = [part for part in text.split(",") if part]
     limits = Limits.from_text(",".join(part for part in parts if part != TRUST))

@@ -62,10 +62,12 @@ class Driving:
         seen = observation_from_document(document, self._problem)
         self._tick = seen.tick
         command = self._controller.act(seen)
-        found = checked_reports(self._controller.report()) if isinstance(self._controller, Reports) else []
+        made_reports = (
+            checked_reports(self._controller.report()) if isinstance(self._controller, Reports) else []
+        )
         if command is None:
             return {"bye": f"the controller gave up at tick {seen.tick}"}
-        reports = {"reports": found} if found else {}
+        reports = {"reports": made_reports} if made_reports else {}
         return {"command": checked_command(command, seen.tick), "tick": seen.tick, **reports}
 
     def _close(self) -> dict[str, Any]:

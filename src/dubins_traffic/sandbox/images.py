@@ -47,24 +47,16 @@ _EXPECTED: Final = "an archive of one image, as `podman save` writes it"
 
 @dataclass(frozen=True, slots=True)
 class Image:
-    """An image that has been unpacked.
-
-    Parameters
-    ----------
-    root : str
-        The folder of its files.
-    command : tuple of str
-        What it runs unless told otherwise.
-    environment : Mapping
-        Its environment.
-    folder : str
-        Where it runs.
-    """
+    """An image that has been unpacked."""
 
     root: str
+    """The folder of its files."""
     command: tuple[str, ...]
+    """What it runs unless told otherwise."""
     environment: Mapping[str, str]
+    """Its environment."""
     folder: str
+    """Where it runs."""
 
 
 def unpacked(archive: Path, store: Path | None = None) -> Image:
@@ -124,7 +116,7 @@ class _Podman:
     def __call__(self, *words: str) -> str:
         """Return what podman says; InputError if it says no, OSError if it has no room."""
         home = str(self._folder)
-        own = {
+        environment = {
             "HOME": home,
             "TMPDIR": home,
             "XDG_RUNTIME_DIR": home,
@@ -137,7 +129,7 @@ class _Podman:
                 capture_output=True,
                 timeout=WAIT,
                 check=False,
-                env=own,
+                env=environment,
                 cwd=home,
             )
         except subprocess.TimeoutExpired:
@@ -145,8 +137,8 @@ class _Podman:
         if NO_ROOM in done.stderr.lower():
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         if done.returncode:
-            said = done.stderr.decode(errors="replace").strip().splitlines() or ["it does not say why"]
-            raise InputError(shown(said[0], 200), field=f"podman {words[0]}", expected=_EXPECTED)
+            lines = done.stderr.decode(errors="replace").strip().splitlines() or ["it does not say why"]
+            raise InputError(shown(lines[0], 200), field=f"podman {words[0]}", expected=_EXPECTED)
         return done.stdout.decode(errors="replace").strip()
 
 
@@ -182,10 +174,10 @@ def _flattened(podman: Callable[..., str], archive: Path, target: Path) -> Mappi
     """Let podman read an image and write its files; return what is said of it."""
     try:
         podman("load", "--quiet", "--input", str(archive.resolve()))
-        found = set(podman("images", "--quiet", "--no-trunc").split())
-        if len(found) != 1:
-            raise InputError("not one image", value=len(found), expected=_EXPECTED)
-        image = found.pop()
+        images = set(podman("images", "--quiet", "--no-trunc").split())
+        if len(images) != 1:
+            raise InputError("not one image", value=len(images), expected=_EXPECTED)
+        image = images.pop()
         config = json.loads(podman("image", "inspect", image))[0]["Config"]
         container = podman("create", "--network=none", "--pull=never", image, "/none")
         podman("export", "--output", str(target), container)
@@ -198,8 +190,8 @@ def _flattened(podman: Callable[..., str], archive: Path, target: Path) -> Mappi
 
 def _described(config: Mapping[str, object]) -> Image:
     def words(name: str) -> Sequence[str]:
-        found = config.get(name)
-        return [str(word) for word in found] if isinstance(found, list) else []  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
+        value = config.get(name)
+        return [str(word) for word in value] if isinstance(value, list) else []  # pyright: ignore[reportUnknownVariableType, reportUnknownArgumentType]
 
     pairs = (text.partition("=") for text in words("Env"))
     environment = {name: value for name, _, value in pairs if name.isidentifier() and name.isascii()}

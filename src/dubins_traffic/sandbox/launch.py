@@ -69,28 +69,28 @@ class Program:
 
 
 def command_line(
-    program: Program, limits: Limits, layers: Layers, *, doors: Sequence[str], seccomp: int, told: bool = True
+    program: Program,
+    limits: Limits,
+    layers: Layers,
+    *,
+    doors: Sequence[str],
+    seccomp: int,
+    reports_start: bool = True,
 ) -> list[str]:
     """Return the command line that begins a box.
 
     Parameters
     ----------
-    program : Program
-        What runs in it.
-    limits : Limits
-        What it may use.
-    layers : Layers
-        Which layers it has.
     doors : sequence of str
         Files of its control group into which the first process writes its number.
     seccomp : int
         Descriptor from which bubblewrap reads the filter of system calls; -1 for none.
-    told : bool
+    reports_start : bool
         Whether the box says on standard error that it stands.
     """
     root = os.getuid() == 0 and layers.boxes
     shell = _own_shell() if program.image else ["/bin/sh"]
-    inner = [*shell, "-c", _limits(limits, layers, told, _entry(program)), "box"]
+    inner = [*shell, "-c", _limits(limits, layers, reports_start, _entry(program)), "box"]
     if not layers.boxes:
         return _entered([*inner, *(outside(program, word) for word in program.command)], doors, ())
     inner += program.command
@@ -107,7 +107,7 @@ def command_line(
 
 def outside(program: Program, word: str) -> str:
     """Return a word of a command line, or of an environment, as it is where there is no box."""
-    for each in sorted(program.shown, key=lambda own: len(own.place), reverse=True):
+    for each in sorted(program.shown, key=lambda shown: len(shown.place), reverse=True):
         if word.startswith(each.place):
             return each.source + word.removeprefix(each.place)
         if each.place.rpartition("/")[0] == word:
@@ -135,12 +135,12 @@ def staged(shown: Sequence[Shown]) -> tuple[list[Shown], list[str]]:
     Folders are bound, and the rest is copied: what a submission's owner can read, a box need not be able to.
     """
     stage = _stage()
-    found: list[Shown] = []
+    outside_box: list[Shown] = []
     binds: list[str] = []
     copies: list[str] = []
     for number, each in enumerate(shown):
         if _is_open(each):
-            found.append(each)
+            outside_box.append(each)
             continue
         source = shlex.quote(each.source)
         if each.own or not Path(each.source).is_dir():
@@ -150,10 +150,10 @@ def staged(shown: Sequence[Shown]) -> tuple[list[Shown], list[str]]:
             place = f"{stage}/{number}"
             Path(place).mkdir(mode=0o755, exist_ok=True)
             binds.append(f"mount --bind {source} {place}")
-        found.append(Shown(place, each.place))
+        outside_box.append(Shown(place, each.place))
     if copies:
         copies.insert(0, f"mount -t tmpfs -o mode=755,nosuid,nodev,size={STAGE} box {stage}/copies")
-    return found, binds + copies
+    return outside_box, binds + copies
 
 
 def _is_open(shown: Shown) -> bool:
@@ -217,13 +217,13 @@ def _bubblewrap(program: Program, shown: Sequence[Shown], limits: Limits, layers
 def _shell_files() -> Mapping[str, str]:
     """Return the files of this machine's shell by their names in a box that sees an image."""
     said = subprocess.run(["ldd", "/bin/sh"], capture_output=True, text=True, check=False).stdout
-    found = {"sh": str(Path("/bin/sh").resolve())}
+    libraries = {"sh": str(Path("/bin/sh").resolve())}
     for line in said.splitlines():
         name, arrow, rest = line.strip().partition(" => ")
         path = (rest if arrow else name).partition(" (")[0]
         if path.startswith("/"):
-            found[name if arrow else "ld.so"] = path
-    return found
+            libraries[name if arrow else "ld.so"] = path
+    return libraries
 
 
 def _own_shell() -> list[str]:
@@ -266,7 +266,7 @@ def _devices() -> list[str]:
     return [*words, "--symlink", "/proc/self/fd", "/dev/fd", "--symlink", "/tmp", "/dev/shm"]
 
 
-def _limits(limits: Limits, layers: Layers, told: bool, entry: Sequence[str]) -> str:
+def _limits(limits: Limits, layers: Layers, reports_start: bool, entry: Sequence[str]) -> str:
     """Return what the shell in the box does before it becomes the program."""
     lines = ["set -e"]
     if RLIMITS in layers:
@@ -276,5 +276,5 @@ def _limits(limits: Limits, layers: Layers, told: bool, entry: Sequence[str]) ->
         if MEMORY not in layers:
             most["v"] = limits.memory // 1024
         lines += [f"ulimit -{letter} {value}" for letter, value in most.items()]
-    lines += [f"echo {STANDS} >&2"] if told else []
+    lines += [f"echo {STANDS} >&2"] if reports_start else []
     return "\n".join([*lines, *entry, 'exec "$@"'])

@@ -41,18 +41,12 @@ INSTALL: Final = "scripts/system-packages.sh, or apt-get install bubblewrap libs
 
 @dataclass(frozen=True, slots=True)
 class Layers:
-    """The layers that a box has. Only a test takes one away from those that hold on a machine.
-
-    Parameters
-    ----------
-    names : frozenset of str
-        Of `NAMES`.
-    why : str
-        Why bubblewrap can't be used, if it can't.
-    """
+    """The layers that a box has. Only a test takes one away from those that hold on a machine."""
 
     names: frozenset[str] = frozenset(NAMES)
+    """Of `NAMES`."""
     why: str = ""
+    """Why bubblewrap can't be used, if it can't."""
 
     def __contains__(self, name: str) -> bool:
         return name in self.names
@@ -68,12 +62,12 @@ class Layers:
 
     def missing(self) -> list[str]:
         """Return what can't be enforced here, as lines for people; a stranger's program is refused then."""
-        found: list[str] = []
+        reasons: list[str] = []
         if not self.boxes:
-            found.append(f"bubblewrap makes no boxes here: {self.why}")
+            reasons.append(f"bubblewrap makes no boxes here: {self.why}")
         if SECCOMP not in self:
-            found.append("no filter of system calls: libseccomp2 and pyseccomp are needed")
-        return found
+            reasons.append("no filter of system calls: libseccomp2 and pyseccomp are needed")
+        return reasons
 
     def require(self) -> None:
         """Refuse a machine on which a stranger's program can't be held.

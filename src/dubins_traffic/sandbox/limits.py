@@ -21,40 +21,27 @@ MIB: Final = 1 << 20
 class Limits:
     """What a controller in a box may use in one trial. Processor time is that of all its processes together.
 
-    Parameters
-    ----------
-    start_seconds : float
-        Processor time until it is ready to drive: interpreter, imports, its own `start`.
-    decision_seconds : float
-        Processor time a decision; what a decision takes beyond it comes out of the bank.
-    bank_seconds : float
-        Processor time of a trial beyond that of its decisions; a trial ends when the bank is empty.
-    wall_seconds : float
-        Wall-clock time that a trial may wait for answers beyond five times the processor time that they take, in all:
-        for those who sleep. It is generous, since a busy machine keeps programs waiting.
-    memory : int
-        Bytes of memory, what it writes to files among it.
-    processes : int
-        Processes and threads at a time.
-    files : int
-        Bytes that all files together may hold; there may be as many files as these are KiB.
-    output : int
-        Bytes that it may print in a trial.
-
-    Raises
-    ------
-    InputError
-        If a limit is not a positive number; `bank_seconds` may be 0.
+    InputError if a limit is not a positive number; `bank_seconds` may be 0.
     """
 
     start_seconds: float = 60.0
+    """Processor time until it is ready to drive: interpreter, imports, its own `start`."""
     decision_seconds: float = 1.0
+    """Processor time a decision; what a decision takes beyond it comes out of the bank."""
     bank_seconds: float = 60.0
+    """Processor time of a trial beyond that of its decisions; a trial ends when the bank is empty."""
     wall_seconds: float = 300.0
+    """Wall-clock time that a trial may wait for answers beyond five times the processor time that they take, in all:
+    for those who sleep. It is generous, since a busy machine keeps programs waiting.
+    """
     memory: int = 2048 * MIB
+    """Bytes of memory, what it writes to files among it."""
     processes: int = 64
+    """Processes and threads at a time."""
     files: int = 64 * MIB
+    """Bytes that all files together may hold; there may be as many files as these are KiB."""
     output: int = MIB
+    """Bytes that it may print in a trial."""
 
     def __post_init__(self) -> None:
         """Refuse what is no limit."""
@@ -97,8 +84,8 @@ class Limits:
     def text(self) -> str:
         """Return what `from_text` reads: the limits that are not the usual ones."""
         usual = Limits()
-        told = ((each.name, getattr(self, each.name), getattr(usual, each.name)) for each in fields(self))
-        return ",".join(f"{name}={value!r}" for name, value, other in told if value != other)
+        triples = ((each.name, getattr(self, each.name), getattr(usual, each.name)) for each in fields(self))
+        return ",".join(f"{name}={value!r}" for name, value, other in triples if value != other)
 
 
 _UNITS: Final = {"K": 1 << 10, "M": 1 << 20, "G": 1 << 30}
@@ -116,24 +103,16 @@ def _number(name: str, text: str, *, whole: bool) -> float:
 
 @dataclass(frozen=True, slots=True)
 class BoxEnd:
-    """How the driving of a controller in a box ended, if not with its trial.
-
-    Parameters
-    ----------
-    name : str
-        One of the named ends of a trial (`protocols.End`).
-    fault : str
-        Whose fault it was: ``submission`` or ``platform``.
-    detail : str
-        A line for people; it stands in the record as the detail of the trial's ending.
-    log_tail : str
-        The last that the controller printed.
-    """
+    """How the driving of a controller in a box ended, if not with its trial."""
 
     name: str
+    """One of the named ends of a trial (`protocols.End`)."""
     fault: Fault
+    """Whose fault it was: ``submission`` or ``platform``."""
     detail: str
+    """A line for people; it stands in the record as the detail of the trial's ending."""
     log_tail: str = ""
+    """The last that the controller printed."""
 
 
 OWNERS: Final[Mapping[End, Fault]] = {

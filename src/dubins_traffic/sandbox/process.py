@@ -62,10 +62,10 @@ class ProcessClocks:
         waiting = [self._first]
         while waiting:
             process = waiting.pop()
-            found = _stat(process)
-            if found is None:
+            used = _stat(process)
+            if used is None:
                 continue
-            seconds, pages = found
+            seconds, pages = used
             total, memory = total + seconds, memory + pages * _PAGE
             seen.append(process)
             waiting += children(process)
@@ -74,7 +74,7 @@ class ProcessClocks:
 
     def buffers(self) -> int:
         """Return how many bytes the kernel holds at most in the pipes and sockets of the processes of the last look."""
-        found: set[str] = set()
+        kernel_objects: set[str] = set()
         unseen = 0
         for thread in (each for process in self.processes for each in _threads(process)):
             try:
@@ -86,9 +86,9 @@ class ProcessClocks:
                 continue
             for each in held:
                 with contextlib.suppress(OSError):
-                    found.add(str(each.readlink()))
-        sockets = unseen + sum(name.startswith("socket:") for name in found)
-        return sockets * _socket() + sum(name.startswith("pipe:") for name in found) * PIPE
+                    kernel_objects.add(str(each.readlink()))
+        sockets = unseen + sum(name.startswith("socket:") for name in kernel_objects)
+        return sockets * _socket() + sum(name.startswith("pipe:") for name in kernel_objects) * PIPE
 
 
 def _stat(process: int) -> tuple[float, int] | None:
@@ -100,8 +100,8 @@ def _stat(process: int) -> tuple[float, int] | None:
     parts = data.rpartition(b")")[2].split()
     user, system, gone_user, gone_system = (int(part) for part in parts[11:15])
     exact = _exact(process)
-    own = (user + system) * _TICK if exact is None else exact
-    return own + (gone_user + gone_system) * _TICK, int(parts[21])
+    alive = (user + system) * _TICK if exact is None else exact
+    return alive + (gone_user + gone_system) * _TICK, int(parts[21])
 
 
 def _exact(process: int) -> float | None:
@@ -126,8 +126,8 @@ def _table(thread: Path) -> int:
         lines = (thread / "status").read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError:
         return 0
-    said = dict(line.split(":", 1) for line in lines if ":" in line)
-    return 0 if said["State"].split()[0] in ("Z", "X") else int(said.get("FDSize", "0"))
+    status = dict(line.split(":", 1) for line in lines if ":" in line)
+    return 0 if status["State"].split()[0] in ("Z", "X") else int(status.get("FDSize", "0"))
 
 
 @cache
@@ -142,13 +142,13 @@ def _socket() -> int:
 
 def children(process: int) -> list[int]:
     """Return the numbers of the processes that a process has begun and that are there."""
-    found: list[int] = []
+    numbers: list[int] = []
     try:
         for thread in Path(f"/proc/{process}/task").iterdir():
-            found += map(int, (thread / "children").read_text().split())
+            numbers += map(int, (thread / "children").read_text().split())
     except OSError:
-        return found
-    return found
+        return numbers
+    return numbers
 
 
 GRACE: Final = 10.0
@@ -160,12 +160,6 @@ class Processes:
 
     Parameters
     ----------
-    program : Program
-        What runs in the box.
-    limits : Limits
-        What it may use.
-    layers : Layers
-        The layers of the box.
     prints : bool
         Whether what is printed goes where this process prints.
 
@@ -193,9 +187,9 @@ class Processes:
                 self._group.close()
             raise
         self._streams = [self._process.stdin, self._process.stdout, self._process.stderr]
-        own = [stream.fileno() for stream in self._streams if stream is not None]
-        self.questions, self.answers, self.printed = own if len(own) == 3 else (*own, -1)
-        for each in own:
+        ends = [stream.fileno() for stream in self._streams if stream is not None]
+        self.questions, self.answers, self.printed = ends if len(ends) == 3 else (*ends, -1)
+        for each in ends:
             os.set_blocking(each, False)
         self._forgotten = weakref.finalize(self, _shut, self._process)
         self._others: list[int] = []
@@ -218,7 +212,7 @@ class Processes:
                 self._layers,
                 doors=doors,
                 seccomp=source,
-                told=self._errors is not None,
+                reports_start=self._errors is not None,
             )
             self._process = subprocess.Popen(
                 line,
@@ -250,10 +244,10 @@ class Processes:
         if not self._first:
             return 0
         try:
-            found = os.statvfs(f"/proc/{self._first}/root/tmp")
+            filesystem = os.statvfs(f"/proc/{self._first}/root/tmp")
         except OSError:
             return 0
-        return found.f_files - found.f_ffree
+        return filesystem.f_files - filesystem.f_ffree
 
     def status(self, seconds: float) -> str | None:
         """Return how the first process ended, None if it does not within some `seconds`."""
@@ -272,8 +266,8 @@ class Processes:
     def note(self) -> None:
         """Note the first process of the box itself, with whose end that of all others is waited for."""
         if self._layers.boxes and not self._others:
-            found = children(self._process.pid)
-            self._others, self._first = _opened(found), next(iter(found), 0)
+            numbers = children(self._process.pid)
+            self._others, self._first = _opened(numbers), next(iter(numbers), 0)
 
     def _kill(self) -> None:
         """Kill the first process, and with it the box."""
@@ -308,11 +302,11 @@ def _shut(process: subprocess.Popen[bytes]) -> None:
 
 def _opened(processes: Sequence[int]) -> list[int]:
     """Return descriptors of processes that are there."""
-    found: list[int] = []
+    descriptors: list[int] = []
     for process in processes:
         with contextlib.suppress(ProcessLookupError):
-            found.append(os.pidfd_open(process))
-    return found
+            descriptors.append(os.pidfd_open(process))
+    return descriptors
 
 
 def _see_off(process: int) -> None:
@@ -341,11 +335,11 @@ def _groups(layers: Layers) -> cgroups.Trees:
 
 
 def _environment(program: Program, layers: Layers) -> dict[str, str]:
-    own = {"PATH": os.environ.get("PATH", os.defpath)} if ENVIRONMENT in layers else dict(os.environ)
+    base = {"PATH": os.environ.get("PATH", os.defpath)} if ENVIRONMENT in layers else dict(os.environ)
     if layers.boxes:
-        return own
+        return base
     more = {name: outside(program, value) for name, value in program.environment.items()}
-    return own | {"HOME": "/tmp", "LANG": "C.UTF-8", **more}
+    return base | {"HOME": "/tmp", "LANG": "C.UTF-8", **more}
 
 
 @contextlib.contextmanager

@@ -155,8 +155,8 @@ def script(inside: str, *words: str) -> Program:
 
 def _python(spec: str, *shown: Shown, paths: tuple[str, ...] = ()) -> Program:
     """Return the program that drives with a controller in Python, by our shim."""
-    _, _, own = interpreter()
-    words = [word for path in (*own, *paths) for word in ("--path", path)]
+    _, _, search_path = interpreter()
+    words = [word for path in (*search_path, *paths) for word in ("--path", path)]
     base = script(SHIM, *words, spec)
     kernels = folders.base_folder()
     environment = {**base.environment, **ONE_THREAD, folders.FOLDER: KERNELS, folders.TIER: folders.KEPT}
@@ -187,7 +187,7 @@ def interpreter() -> tuple[str, tuple[Shown, ...], tuple[str, ...]]:
 def _packages() -> list[Path]:
     """Return the folders with packages that this interpreter looks in, that of numpy among them."""
     numpys = Path(numpy.__file__).resolve().parents[1]
-    found = [
+    places = [
         Path(place).resolve() for place in sys.path if place.endswith(("site-packages", "dist-packages"))
     ]
-    return list(dict.fromkeys([numpys, *(place for place in found if place.is_dir())]))
+    return list(dict.fromkeys([numpys, *(place for place in places if place.is_dir())]))

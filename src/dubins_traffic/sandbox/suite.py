@@ -111,12 +111,12 @@ class Baits:
 
     def daemons(self) -> list[int]:
         """Return the processes that an attack has left behind on the host."""
-        found: list[int] = []
+        processes: list[int] = []
         for folder in Path("/proc").iterdir():
             with contextlib.suppress(OSError):
                 if folder.name.isdigit() and self.daemon.encode() in (folder / "cmdline").read_bytes():
-                    found.append(int(folder.name))
-        return found
+                    processes.append(int(folder.name))
+        return processes
 
 
 LIMITS: Final = Limits(
@@ -135,21 +135,14 @@ PRELUDE: Final = "sandbox/attacks/prelude.py"
 
 @dataclass(frozen=True, slots=True)
 class Strike:
-    """What came of an attack.
-
-    Parameters
-    ----------
-    attack : Attack
-        The attack.
-    stopped : bool
-        Whether it was stopped.
-    words : str
-        By what, or what it got hold of.
-    """
+    """What came of an attack."""
 
     attack: Attack
+    """The attack."""
     stopped: bool
+    """Whether it was stopped."""
     words: str
+    """By what, or what it got hold of."""
 
 
 def strikes(layers: Layers, attacks: Sequence[Attack] = ATTACKS) -> Iterator[Strike]:

@@ -15,7 +15,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.service.tables import Account, Act, Code, Team, Token
+from dubins_traffic.service.database_tables import Account, Act, Code, Team, Token
 
 ORGANISER, PARTICIPANT = "organiser", "participant"
 ROLES = (PARTICIPANT, ORGANISER)
@@ -86,11 +86,11 @@ def invite(session: Session, role: str, team: Team | None, at: float) -> str:
 
 def _use(session: Session, code: str, kind: str, at: float) -> Code:
     query = select(Code).where(Code.digest == digest_of(code.strip()), Code.kind == kind)
-    found = session.scalars(query).first()
-    if found is None or found.used is not None or found.expires <= at:
+    row = session.scalars(query).first()
+    if row is None or row.used is not None or row.expires <= at:
         raise WrongEntryError("code: unknown, used or expired; ask the organiser for another")
-    found.used = at
-    return found
+    row.used = at
+    return row
 
 
 def register(session: Session, code: str, name: str, password: str, team: str, at: float) -> Account:
@@ -114,11 +114,11 @@ def register(session: Session, code: str, name: str, password: str, team: str, a
     session.add(account)
     session.flush()
     if account.team_id is None and team.strip():
-        account.team_id = found_team(session, team, at).id
+        account.team_id = make_team(session, team, at).id
     return account
 
 
-def found_team(session: Session, name: str, at: float) -> Team:
+def make_team(session: Session, name: str, at: float) -> Team:
     """Make a new team; WrongEntryError if the name is taken or is none."""
     name = clean_name(name, "team")
     if name.casefold() in map(str.casefold, session.scalars(select(Team.name))):
@@ -133,8 +133,8 @@ def verified(session: Session, name: str, password: str) -> Account | None:
     """Return the account that a name and a password are of, else None."""
     wanted = " ".join(unicodedata.normalize("NFKC", name).split()).casefold()
     there = session.execute(select(Account.id, Account.name).where(Account.removed.is_(None))).all()
-    found = next((number for number, known in there if known.casefold() == wanted), None)
-    account = None if found is None else session.get(Account, found)
+    account_id = next((number for number, known in there if known.casefold() == wanted), None)
+    account = None if account_id is None else session.get(Account, account_id)
     try:
         _hasher().verify(_nobody() if account is None else account.password, password[:LONGEST_PASSWORD])
     except (VerificationError, InvalidHashError):

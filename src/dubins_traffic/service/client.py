@@ -184,12 +184,12 @@ def competition_at(url: str) -> tuple[Address, str | None]:
 
     InputError if it is not such an address.
     """
-    found = _COMPETITION.fullmatch(url)
-    if found is None:
+    parts = _COMPETITION.fullmatch(url)
+    if parts is None:
         raise InputError(
             "no address of a competition", value=url, expected="https://host/c/COMPETITION/PHASE"
         )
-    return Address(found[1], f"/api/competitions/{found[2]}"), found[3]
+    return Address(parts[1], f"/api/competitions/{parts[2]}"), parts[3]
 
 
 def phase_at(url: str) -> Address:
@@ -202,10 +202,10 @@ def phase_at(url: str) -> Address:
 
 def submission_at(url: str) -> Address:
     """Return where a submission is by the address of its page; InputError if it is no such address."""
-    found = _SUBMISSION.fullmatch(url)
-    if found is None:
+    parts = _SUBMISSION.fullmatch(url)
+    if parts is None:
         raise InputError("no address of a submission", value=url, expected="https://host/s/NUMBER")
-    return Address(found[1], f"/api/submissions/{found[2]}")
+    return Address(parts[1], f"/api/submissions/{parts[2]}")
 
 
 def fetched_competition(url: str) -> Competition:
@@ -239,8 +239,8 @@ def submit(url: str, path: Path, token: str) -> tuple[str, dict[str, Any]]:
     """
     asked = phase_at(url)
     name, data = packed(path)
-    told = asked.connection(token).upload(asked.path, name, data)
-    return f"{asked.host}/s/{told['id']}", told
+    submission = asked.connection(token).upload(asked.path, name, data)
+    return f"{asked.host}/s/{submission['id']}", submission
 
 
 def status(url: str, token: str) -> dict[str, Any]:
@@ -264,7 +264,7 @@ def cancel(url: str, token: str) -> dict[str, Any]:
 def wait(url: str, token: str, pause: float = POLL_S) -> dict[str, Any]:
     """Return what may be seen of a submission once it has ended; the errors are those of `submit`."""
     while True:
-        told = status(url, token)
-        if not told["active"]:
-            return told
+        submission = status(url, token)
+        if not submission["active"]:
+            return submission
         time.sleep(pause)

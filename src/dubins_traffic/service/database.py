@@ -112,14 +112,14 @@ class Database:
 
 
 def _check_known(connection: Connection, known: ScriptDirectory) -> None:
-    found = MigrationContext.configure(connection).get_current_revision()
-    ours = {own.revision for own in known.walk_revisions()}
-    if found is not None and found not in ours:
+    revision = MigrationContext.configure(connection).get_current_revision()
+    ours = {script.revision for script in known.walk_revisions()}
+    if revision is not None and revision not in ours:
         raise InputError(
             "a later version of dubins-traffic made these tables",
             file=connection.engine.url.render_as_string(hide_password=True),
             field="version of the tables",
-            value=found,
+            value=revision,
             expected=f"{known.get_current_head()} at most: this is dubins-traffic {version('dubins-traffic')}; install "
             "the version that made them, or restore the backup from before the upgrade",
         )

@@ -16,7 +16,7 @@ from cryptography.exceptions import InvalidTag
 
 from dubins_traffic.competition.sealing import cipher_of
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.service.tables import Chunk, Standing, Trial
+from dubins_traffic.service.database_tables import Chunk, Standing, Trial
 
 NONCE: Final = 12
 HIDDEN: Final = {Trial: ("row", "end", "owner", "frames", "ran", "again"), Standing: ("places",)}
@@ -81,11 +81,11 @@ class Hiding:
         same = {
             name: getattr(row, name) for name in ("submission_id", "run", "number", "replay", "own_replay")
         }
-        found = Trial(**same, **self._known(row))
+        twin_trial = Trial(**same, **self._known(row))
         if logs:
             packed = base64.b64decode(row.log)
-            found.log = self.show(packed, f"log of {_what(row)}").decode(errors="replace")
-        return cast("Row", found)
+            twin_trial.log = self.show(packed, f"log of {_what(row)}").decode(errors="replace")
+        return cast("Row", twin_trial)
 
     def _known(self, row: Trial | Standing) -> dict[str, Any]:
         if row.hidden is None:

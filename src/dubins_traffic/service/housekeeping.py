@@ -12,9 +12,9 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.orm import Session
 
 from dubins_traffic.service import organising, queue, standings, submissions
+from dubins_traffic.service.database_tables import Phase, Submission
 from dubins_traffic.service.hiding import Hiding
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Phase, Submission
 
 PAUSE_S = 1.0
 PODIUM = 3
@@ -27,8 +27,6 @@ def end_silent(service: Service, *, was_away: bool = False) -> None:
 
     Parameters
     ----------
-    service : Service
-        The service.
     was_away : bool
         The service or its database was away until now, for some writers at least. Workers could not renew their
         leases then, so all leases begin anew.
@@ -80,8 +78,8 @@ def check_podiums(service: Service) -> None:
 def _run_podium_again(session: Session, phase: Phase, hiding: Hiding) -> None:
     for number in standings.first_entries(session, phase, PODIUM, hiding):
         submission = session.get_one(Submission, number)
-        found = submissions.trials(session, submission, hiding)
-        left = [trial.number for trial in found if trial.again is None]
+        its_trials = submissions.trials(session, submission, hiding)
+        left = [trial.number for trial in its_trials if trial.again is None]
         queue.add(session, submission, "again", submissions.in_chunks(left))
     phase.podium_checked = True
 

@@ -12,13 +12,7 @@ import structlog
 
 
 class Tolerant(io.TextIOBase):
-    """A stream on which a line that can't be written is lost, as on a full disk: nothing fails for its log.
-
-    Parameters
-    ----------
-    stream : TextIO
-        Where lines go.
-    """
+    """A stream on which a line that can't be written is lost, as on a full disk: nothing fails for its log."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream

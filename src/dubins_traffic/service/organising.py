@@ -22,8 +22,8 @@ from dubins_traffic.competition.competition import Competition as Loaded
 from dubins_traffic.errors import DubinsTrafficError, InputError, shown
 from dubins_traffic.service import receiving, standings, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError, note
+from dubins_traffic.service.database_tables import Account, Competition, Phase, Submission
 from dubins_traffic.service.service import Service, competition_of
-from dubins_traffic.service.tables import Account, Competition, Phase, Submission
 
 SLUG = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,58}[a-z0-9])?")
 PLAIN = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,99}")
@@ -35,14 +35,10 @@ def create(service: Service, slug: str, given: Mapping[str, bytes], by: Account 
 
     Parameters
     ----------
-    service : Service
-        The service.
     slug : str
         Its address: lower letters, digits and hyphens.
     given : Mapping
         Name of a file to its bytes; a single one may be called as it likes.
-    by : Account or None
-        Who does it.
 
     Raises
     ------
@@ -143,14 +139,14 @@ def publish_opened(service: Service) -> None:
     at = service.clock()
     with service.database.reading() as session:
         rows = session.scalars(select(Phase).where(Phase.commitment.is_(None))).all()
-        found: dict[int, str] = {}
+        commitments: dict[int, str] = {}
         for row in rows:
             phase = service.phase(row)
             if phase.secret and (row.opens is None or row.opens <= at):
-                found[row.id] = sealing.publish(phase, row.competition.title).commitment
-    if found:
+                commitments[row.id] = sealing.publish(phase, row.competition.title).commitment
+    if commitments:
         with service.database.writing() as session:
-            for number, commitment in found.items():
+            for number, commitment in commitments.items():
                 row = session.get_one(Phase, number)
                 row.commitment = commitment
                 note(session, None, "publish", _name(row), commitment, at)
@@ -233,17 +229,7 @@ Run the entry on the first place again, and compare its rows:
 
 
 def export(service: Service, session: Session, row: Competition) -> bytes:
-    """Return a competition as a zip archive; phases that are still open are left out.
-
-    Parameters
-    ----------
-    service : Service
-        The service.
-    session : Session
-        A reader's.
-    row : Competition
-        Which one.
-    """
+    """Return a competition as a zip archive; phases that are still open are left out."""
     made = io.BytesIO()
     with zipfile.ZipFile(made, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, data in _entries(service, session, row):
@@ -262,19 +248,19 @@ def _entries(service: Service, session: Session, row: Competition) -> Iterator[t
     for phase in row.phases:
         if not phase.is_closed(service.clock()) and phase.shows != "all":
             continue
-        found = receiving.submissions_of(session, phase, None)
-        yield from _of_phase(service, session, phase, found)
-        sent |= {one.digest for one in found}
+        its_submissions = receiving.submissions_of(session, phase, None)
+        yield from _of_phase(service, session, phase, its_submissions)
+        sent |= {one.digest for one in its_submissions}
     for digest in sorted(sent):
         yield f"submissions/{digest}", service.storage.get(digest, "submissions")
 
 
 def _of_phase(
-    service: Service, session: Session, phase: Phase, found: list[Submission]
+    service: Service, session: Session, phase: Phase, its_submissions: list[Submission]
 ) -> Iterator[tuple[str, bytes]]:
     hiding = service.hiding(phase)
     latest = standings.latest_standing(session, phase, hiding)
-    counted = {own.id for own in standings.counting(session, phase).values()}
+    counted = {submission.id for submission in standings.counting(session, phase).values()}
     yield f"{phase.name}/table.json", _json([] if latest is None else latest.places)
     described = [
         {
@@ -287,12 +273,12 @@ def _of_phase(
             "disqualified": one.disqualified,
             "counted": one.id in counted,
         }
-        for one in sorted(found, key=lambda own: own.id)
+        for one in sorted(its_submissions, key=lambda submission: submission.id)
     ]
     yield f"{phase.name}/submissions.json", _json(described)
-    for one in found:
+    for one in its_submissions:
         trials = submissions.trials(session, one, hiding)
-        rows = [{**viewing.shared(own.row), "frames": own.frames} for own in trials]
+        rows = [{**viewing.shared(trial.row), "frames": trial.frames} for trial in trials]
         yield f"{phase.name}/results-{one.id}.json", _json(rows)
 
 

@@ -12,7 +12,7 @@ from sqlalchemy import func, or_, select, update
 from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import DubinsTrafficError
-from dubins_traffic.service.tables import Chunk, Submission, Team
+from dubins_traffic.service.database_tables import Chunk, Submission, Team
 
 ATTEMPTS = 5
 """So many leases of a chunk may end without a result; then its submission fails, by our fault."""
@@ -87,14 +87,6 @@ def release(session: Session, chunk: Chunk, note: str, at: float, *, worker_left
 
     Parameters
     ----------
-    session : Session
-        A writer's.
-    chunk : Chunk
-        The chunk, on lease.
-    note : str
-        Why.
-    at : float
-        Now.
     worker_left : bool
         The worker gave it back in order; this attempt is not counted.
 
@@ -150,13 +142,15 @@ def places(session: Session) -> Mapping[int, int]:
     many = Counter(row.team_id for row in rows)
     turns = {row.team_id: (row.turn, row.team_id) for row in rows}
     before: Counter[int] = Counter()
-    found: dict[int, int] = {}
+    places_ahead: dict[int, int] = {}
     for submission_id, team_id, _ in rows:
-        own = before[team_id]
+        ahead = before[team_id]
         before[team_id] += 1
-        if submission_id not in found:
+        if submission_id not in places_ahead:
             others = sum(
-                min(many[other], own + (turns[other] < turns[team_id])) for other in many if other != team_id
+                min(many[other], ahead + (turns[other] < turns[team_id]))
+                for other in many
+                if other != team_id
             )
-            found[submission_id] = own + others + 1
-    return found
+            places_ahead[submission_id] = ahead + others + 1
+    return places_ahead

@@ -30,37 +30,28 @@ log = structlog.get_logger("dubins_traffic.worker")
 
 @dataclass(frozen=True)
 class Task:
-    """What each actor is to do.
-
-    Parameters
-    ----------
-    url, token : str
-        The service, and the token of its workers.
-    name : str
-        What the service calls them; a number is added.
-    folder : str or None
-        For submissions, on each node; None: in the cache folder there.
-    trust : bool
-        As of `Worker`.
-    version : str
-        The version of this package that nodes must have.
-    """
+    """What each actor is to do."""
 
     url: str
     token: str
+    """`url`, `token`: the service, and the token of its workers."""
     name: str
+    """What the service calls them; a number is added."""
     folder: str | None = None
+    """For submissions, on each node; None: in the cache folder there."""
     trust: bool = False
+    """As of `Worker`."""
     version: str = version(PACKAGE)
+    """The version of this package that nodes must have."""
 
 
 class Carried:
     """An actor: a worker on a node of the cluster."""
 
     def __init__(self, task: Task, number: int) -> None:
-        own = version(PACKAGE)
-        if own != task.version:
-            raise DubinsTrafficError(f"{socket.gethostname()} has {PACKAGE} {own}, not {task.version}")
+        installed = version(PACKAGE)
+        if installed != task.version:
+            raise DubinsTrafficError(f"{socket.gethostname()} has {PACKAGE} {installed}, not {task.version}")
         logs.to_stderr()
         folder = default_folder() if task.folder is None else Path(task.folder)
         name = f"{task.name[:50]} {number}"

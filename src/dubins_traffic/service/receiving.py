@@ -10,16 +10,16 @@ from sqlalchemy.orm import Session
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service import submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database_tables import Account, Phase, Submission
 from dubins_traffic.service.service import Service, phase_of
 from dubins_traffic.service.submissions import RefusedError, Upload
-from dubins_traffic.service.tables import Account, Phase, Submission
 
 
 class UnknownError(DubinsTrafficError):
     """There is no such thing, or not for who asks."""
 
 
-def found_phase(session: Session, slug: str, name: str) -> Phase:
+def phase_named(session: Session, slug: str, name: str) -> Phase:
     """Return a phase; UnknownError if there is none."""
     phase = phase_of(session, slug, name)
     if phase is None:
@@ -27,7 +27,7 @@ def found_phase(session: Session, slug: str, name: str) -> Phase:
     return phase
 
 
-def found_submission(session: Session, number: int, account: Account | None) -> Submission:
+def submission_numbered(session: Session, number: int, account: Account | None) -> Submission:
     """Return a submission of somebody's team; UnknownError if there is none, or it is another team's."""
     submission = session.get(Submission, number) if number < 1 << 31 else None
     if submission is None or not viewing.owns(account, submission):
@@ -60,14 +60,14 @@ def take_in(
     at = service.clock()
     upload = Upload(hashlib.sha256(data).hexdigest(), filename or "upload", len(data))
     with service.database.reading() as session:
-        phase = found_phase(session, slug, name)
+        phase = phase_named(session, slug, name)
         submissions.admitted(session, phase, service.phase(phase).quota, account, upload, at)
     service.storage.put(data, "submissions")
 
     def keep(session: Session) -> tuple[int, bool]:
-        row = found_phase(session, slug, name)
-        own = session.get_one(Account, account.id)
-        submission, new = submissions.receive(session, row, service.phase(row).quota, own, upload, at)
+        row = phase_named(session, slug, name)
+        member = session.get_one(Account, account.id)
+        submission, new = submissions.receive(session, row, service.phase(row).quota, member, upload, at)
         return submission.id, new
 
     return service.database.patiently(keep)
@@ -77,7 +77,7 @@ def cancel(service: Service, account: Account, number: int) -> None:
     """Cancel a submission of somebody's team; RefusedError if it has ended."""
 
     def end(session: Session) -> None:
-        submissions.cancel(session, found_submission(session, number, account), service.clock())
+        submissions.cancel(session, submission_numbered(session, number, account), service.clock())
 
     service.database.patiently(end)
 
@@ -89,17 +89,17 @@ def name_it(service: Service, account: Account, number: int) -> None:
     """
 
     def choose(session: Session) -> None:
-        submission = found_submission(session, number, account)
+        submission = submission_numbered(session, number, account)
         if submission.team_id != account.team_id:
             raise RefusedError("only its team may name it")
         if submission.phase.is_closed(service.clock()):
             raise RefusedError("the phase is closed")
         if submission.state in ("rejected", "cancelled"):
             raise RefusedError(f"it is {submission.state}")
-        own = update(Submission).where(
+        its_team = update(Submission).where(
             Submission.phase_id == submission.phase_id, Submission.team_id == submission.team_id
         )
-        session.execute(own.values(named=False))
+        session.execute(its_team.values(named=False))
         submission.named = True
         submission.phase.version += 1
 

@@ -24,15 +24,15 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.files import exists, read_text
 from dubins_traffic.problem.faults import Strict, parse
 from dubins_traffic.service.database import Database
+from dubins_traffic.service.database_tables import Competition, Phase
 from dubins_traffic.service.hiding import NOTHING, Hiding, hiding_of
 from dubins_traffic.service.storage import Storage
-from dubins_traffic.service.tables import Competition, Phase
 
 FILE = "service.toml"
 Positive = Annotated[float, Field(gt=0)]
 
 
-class Settings(Strict):
+class ServiceSettings(Strict):
     """What may be set, and what it is unless set."""
 
     name: str = Field(
@@ -64,22 +64,22 @@ class Settings(Strict):
         return self.url.startswith("https://")
 
 
-def load_settings(folder: Path) -> Settings:
+def load_settings(folder: Path) -> ServiceSettings:
     """Return the settings in the folder of a service, those that are not set at their defaults.
 
     InputError if the file can't be read or something in it is wrong.
     """
     path = folder / FILE
     if not exists(path):
-        return Settings()
+        return ServiceSettings()
     try:
         document = tomllib.loads(read_text(path))
     except (ValueError, RecursionError) as error:
         raise InputError(f"not TOML ({error})", file=str(path)) from None
-    return parse(Settings, document, file=str(path))
+    return parse(ServiceSettings, document, file=str(path))
 
 
-def own_secret(folder: Path, name: str) -> str:
+def secret_in(folder: Path, name: str) -> str:
     """Return a secret of this service that is drawn at its first start, in a file that only its owner may read."""
     path = folder / name
     try:
@@ -115,11 +115,11 @@ class Service:
     def __init__(self, folder: Path, key_file: Path | None = None, clock: Clock = time.time) -> None:
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         self.folder = folder
-        self.settings: Settings = load_settings(folder)
+        self.settings: ServiceSettings = load_settings(folder)
         self.clock = clock
         self.database = Database(self.settings.database or f"sqlite:///{folder / 'service.db'}")
         self.storage = Storage(self.settings.storage or str(folder / "store"))
-        self.cookie_secret = own_secret(folder, "cookies.key")
+        self.cookie_secret = secret_in(folder, "cookies.key")
         self._key = None if key_file is None else _key(key_file, folder)
         self._competitions: dict[int, files.Competition] = {}
         self._seeds: dict[tuple[int, str], tuple[int, ...]] = {}
@@ -127,12 +127,12 @@ class Service:
 
     def competition(self, row: Competition) -> files.Competition:
         """Return a competition as its file says it."""
-        found = self._competitions.get(row.id)
-        if found is None:
+        loaded = self._competitions.get(row.id)
+        if loaded is None:
             place = self.place(row.slug)
-            found = files.Competition.from_document(json.loads(row.document), row.slug, place)
-            self._competitions[row.id] = found
-        return found
+            loaded = files.Competition.from_document(json.loads(row.document), row.slug, place)
+            self._competitions[row.id] = loaded
+        return loaded
 
     def place(self, slug: str) -> Path:
         """Return the folder of a competition: its file, sealed seeds and what is published."""

@@ -19,9 +19,9 @@ from sqlalchemy.orm import Session
 from dubins_traffic.live.listening import address_of
 from dubins_traffic.service import accounts, organising
 from dubins_traffic.service.client import TOKEN
+from dubins_traffic.service.database_tables import Account, Code, Token
 from dubins_traffic.service.housekeeping import Housekeeper
 from dubins_traffic.service.service import Service, competition_of
-from dubins_traffic.service.tables import Account, Code, Token
 from dubins_traffic.service.web.app import create_app
 
 log = structlog.get_logger("dubins_traffic.service")
@@ -156,16 +156,10 @@ def serve(
 
     Parameters
     ----------
-    service : Service
-        Whose tables are up to date.
-    opened : socket
-        Where to listen.
     workers : int
         How many workers to keep beside the server.
     program : sequence of str
         The command of a worker, without its arguments.
-    trust : bool
-        As for workers.
     """
     config = uvicorn.Config(
         create_app(service),

@@ -13,9 +13,9 @@ from dubins_traffic.competition.competition import Phase as Loaded
 from dubins_traffic.competition.judging import Judged
 from dubins_traffic.competition.ranking import missing, rank
 from dubins_traffic.service import submissions
+from dubins_traffic.service.database_tables import Phase, Standing, Submission, Team, Trial
 from dubins_traffic.service.hiding import HiddenError, Hiding
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Phase, Standing, Submission, Team, Trial
 
 log = structlog.get_logger("dubins_traffic.service")
 
@@ -28,26 +28,28 @@ def judged(trials: Sequence[Trial], *, logs: bool = False) -> list[Judged]:
     """Return results as the ranking reads them, with their logs if these have been read."""
     return [
         Judged(
-            number=own.number,
-            row=own.row,
-            end=own.end,
-            owner=own.owner,  # pyright: ignore[reportArgumentType]
-            log=own.log if logs else "",
-            frames=own.frames,
-            ran=own.ran,
+            number=trial.number,
+            row=trial.row,
+            end=trial.end,
+            owner=trial.owner,  # pyright: ignore[reportArgumentType]
+            log=trial.log if logs else "",
+            frames=trial.frames,
+            ran=trial.ran,
         )
-        for own in trials
+        for trial in trials
     ]
 
 
 def counting(session: Session, phase: Phase) -> Mapping[int, Submission]:
     """Return the submission of each team that counts: the one it has named, else the last valid one."""
-    own = select(Submission).where(Submission.phase_id == phase.id, Submission.disqualified == "")
-    ended = own.where(Submission.state.in_(["done", "scoring"]))
-    found: dict[int, Submission] = {}
+    submissions_of_phase = select(Submission).where(
+        Submission.phase_id == phase.id, Submission.disqualified == ""
+    )
+    ended = submissions_of_phase.where(Submission.state.in_(["done", "scoring"]))
+    counted: dict[int, Submission] = {}
     for submission in session.scalars(ended.order_by(Submission.named, Submission.received, Submission.id)):
-        found[submission.team_id] = submission
-    return found
+        counted[submission.team_id] = submission
+    return counted
 
 
 def refresh(service: Service) -> None:
@@ -115,8 +117,8 @@ def table(session: Session, row: Phase, phase: Loaded, hiding: Hiding) -> list[d
 def latest_standing(session: Session, phase: Phase, hiding: Hiding) -> Standing | None:
     """Return the newest table of a phase, if there is one."""
     query = select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id.desc()).limit(1)
-    found = session.scalars(query).first()
-    return None if found is None else hiding.shown(found)
+    standing = session.scalars(query).first()
+    return None if standing is None else hiding.shown(standing)
 
 
 def history(session: Session, phase: Phase, hiding: Hiding) -> Sequence[Standing]:
@@ -146,7 +148,7 @@ def shown_table(phase: Loaded, standing: Standing | None) -> list[dict[str, Any]
 
 def _rounded(value: Any, digits: int) -> Any:
     if isinstance(value, dict):
-        return {name: _rounded(own, digits) for name, own in cast("dict[str, Any]", value).items()}
+        return {name: _rounded(item, digits) for name, item in cast("dict[str, Any]", value).items()}
     if isinstance(value, list):
-        return [_rounded(own, digits) for own in cast("list[Any]", value)]
+        return [_rounded(item, digits) for item in cast("list[Any]", value)]
     return round(value, digits) if isinstance(value, float) else value

@@ -57,10 +57,7 @@ class Storage:
     def get(self, digest: str, kind: str) -> bytes:
         """Return what is kept under a SHA-256.
 
-        Raises
-        ------
-        StorageError
-            If it is not there, is away, or is no longer what it was.
+        StorageError if it is not there, is away, or is no longer what it was.
         """
         try:
             data = bytes(self._store.get(_key(kind, digest)).bytes())

@@ -14,8 +14,8 @@ from sqlalchemy.orm import Session, defer, undefer
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.errors import DubinsTrafficError, shown
 from dubins_traffic.service import queue
+from dubins_traffic.service.database_tables import Account, Chunk, Phase, Submission, Trial
 from dubins_traffic.service.hiding import Hiding
-from dubins_traffic.service.tables import Account, Chunk, Phase, Submission, Trial
 
 HOUR = 3600.0
 DEADLINES = {"received": HOUR, "checking": HOUR, "queued": 168 * HOUR, "running": 48 * HOUR, "scoring": HOUR}
@@ -99,10 +99,7 @@ def admitted(
 ) -> Submission | None:
     """Return the submission that an upload is the same as, None if it is a new one; it may be taken in.
 
-    Raises
-    ------
-    RefusedError
-        As for `receive`, of which this is the part that keeps nothing.
+    RefusedError as for `receive`, of which this is the part that keeps nothing.
     """
     if account.team_id is None:
         raise RefusedError("you are in no team: join or found one first")
@@ -136,9 +133,9 @@ def _may_repeat(submission: Submission) -> bool:
 def used(session: Session, phase: Phase, team_id: int, at: float) -> tuple[int, int, int]:
     """Return how many submissions of a team count today (from 0:00 UTC), in the phase, and wait or run."""
     day = datetime.fromtimestamp(at, UTC).replace(hour=0, minute=0, second=0, microsecond=0).timestamp()
-    own = select(func.count()).where(Submission.phase_id == phase.id, Submission.team_id == team_id)
-    costs = own.where(Submission.costs)
-    active = own.where(Submission.state.in_(ACTIVE))
+    of_team = select(func.count()).where(Submission.phase_id == phase.id, Submission.team_id == team_id)
+    costs = of_team.where(Submission.costs)
+    active = of_team.where(Submission.state.in_(ACTIVE))
     counted = (
         session.scalar(query) or 0 for query in (costs.where(Submission.received >= day), costs, active)
     )
@@ -221,14 +218,8 @@ def record(
 
     Parameters
     ----------
-    session : Session
-        A writer's.
-    chunk : Chunk
-        The chunk, on lease.
     results : sequence of dict
         For each of its trials, or its first, `number`, `row`, `end`, `owner`, `log`, `frames`, `ran` and its replays.
-    at : float
-        Now.
     hiding : Hiding
         Of the phase.
 
@@ -250,8 +241,8 @@ def record(
         for result in results:
             named = {name: result[name] for name in ("number", "replay", "own_replay")}
             trial = Trial(submission_id=submission.id, run=chunk.run, **named)
-            told = {name: result[name] for name in ("row", "end", "owner", "frames", "ran")}
-            hiding.keep(trial, told, result["log"])
+            result_row = {name: result[name] for name in ("row", "end", "owner", "frames", "ran")}
+            hiding.keep(trial, result_row, result["log"])
             session.add(trial)
     chunk.numbers = numbers
     queue.finish(session, chunk)
@@ -283,9 +274,9 @@ def trials(
 
 def _kept(session: Session, submission: Submission, *, logs: bool = False) -> Sequence[Trial]:
     """Return the results of a submission's present run as they are kept."""
-    own = select(Trial).where(Trial.submission_id == submission.id, Trial.run == submission.run)
+    of_run = select(Trial).where(Trial.submission_id == submission.id, Trial.run == submission.run)
     read = undefer(Trial.log) if logs else defer(Trial.log, raiseload=True)
-    return session.scalars(own.order_by(Trial.number).options(read)).all()
+    return session.scalars(of_run.order_by(Trial.number).options(read)).all()
 
 
 def judge_again(session: Session, submission: Submission, numbers: Sequence[int], at: float) -> None:

@@ -11,8 +11,16 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.visibility import SubmissionState, visible
 from dubins_traffic.service import queue, standings, submissions
+from dubins_traffic.service.database_tables import (
+    Account,
+    Chunk,
+    Competition,
+    Phase,
+    Submission,
+    Trial,
+    Worker,
+)
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Account, Chunk, Competition, Phase, Submission, Trial, Worker
 
 ALIVE_S = 120.0
 """A worker that was heard of within so many seconds is there."""
@@ -59,18 +67,18 @@ def replay_of(trial: Trial, submission: Submission, account: Account | None) -> 
     return (owns(account, submission) and trial.own_replay) or trial.replay
 
 
-def told_competition(service: Service, row: Competition) -> dict[str, Any]:
+def competition_document(service: Service, row: Competition) -> dict[str, Any]:
     """Return a competition for everybody."""
     at, loaded = service.clock(), service.competition(row)
     return {
         "address": row.slug,
         "title": row.title,
         "about": loaded.model.about,
-        "phases": [told_phase(service, phase, at) for phase in row.phases],
+        "phases": [phase_document(service, phase, at) for phase in row.phases],
     }
 
 
-def told_phase(service: Service, row: Phase, at: float) -> dict[str, Any]:
+def phase_document(service: Service, row: Phase, at: float) -> dict[str, Any]:
     """Return a phase for everybody."""
     phase = service.phase(row)
     return {
@@ -88,7 +96,7 @@ def told_phase(service: Service, row: Phase, at: float) -> dict[str, Any]:
     }
 
 
-def told_submission(
+def submission_document(
     service: Service,
     session: Session,
     submission: Submission,
@@ -108,8 +116,8 @@ def told_submission(
         iso(submission.received),
         place,
     )
-    found = submissions.trials(session, submission, service.hiding(row), logs=logs)
-    results = standings.judged(found, logs=logs)
+    trials = submissions.trials(session, submission, service.hiding(row), logs=logs)
+    results = standings.judged(trials, logs=logs)
     now = datetime.fromtimestamp(service.clock(), UTC)
     phase = service.phase(row)
     if is_organiser(account):
@@ -135,8 +143,8 @@ def told_submission(
 
 def differing(service: Service, session: Session, submission: Submission) -> list[int]:
     """Return the trials whose frames were others when they were run a second time."""
-    own = submissions.trials(session, submission, service.hiding(submission.phase))
-    return [trial.number for trial in own if trial.again is not None and trial.again != trial.frames]
+    trials = submissions.trials(session, submission, service.hiding(submission.phase))
+    return [trial.number for trial in trials if trial.again is not None and trial.again != trial.frames]
 
 
 def trial_of(service: Service, session: Session, submission: Submission, number: int) -> Trial | None:
@@ -144,22 +152,22 @@ def trial_of(service: Service, session: Session, submission: Submission, number:
     query = select(Trial).where(
         Trial.submission_id == submission.id, Trial.run == submission.run, Trial.number == number
     )
-    found = session.scalars(query).first()
-    return None if found is None else service.hiding(submission.phase).shown(found, logs=True)
+    trial = session.scalars(query).first()
+    return None if trial is None else service.hiding(submission.phase).shown(trial, logs=True)
 
 
-def told_status(service: Service, session: Session) -> dict[str, Any]:
+def status_document(service: Service, session: Session) -> dict[str, Any]:
     """Return how long the queue is and how many workers there are, for everybody."""
     at = service.clock()
     counts = session.execute(
         select(Chunk.state, func.count()).where(Chunk.state.in_(["waiting", "leased"])).group_by(Chunk.state)
     )
-    found = {row[0]: row[1] for row in counts}
+    by_state = {row[0]: row[1] for row in counts}
     alive = session.scalar(select(func.count()).where(Worker.seen > at - ALIVE_S)) or 0
     return {
         "time": iso(at),
-        "waiting": found.get("waiting", 0),
-        "running": found.get("leased", 0),
+        "waiting": by_state.get("waiting", 0),
+        "running": by_state.get("leased", 0),
         "workers": alive,
         "teams_waiting": len(set(session.scalars(select(Chunk.team_id).where(Chunk.state == "waiting")))),
     }

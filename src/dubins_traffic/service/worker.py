@@ -112,10 +112,10 @@ class Worker:
     def _give_back(self, where: str, token: dict[str, Any], error: Exception) -> None:
         """End a lease that came to nothing, if it has not ended; without room here that is no attempt at the chunk."""
         note, unfit = f"{type(error).__name__}: {error}"[:500], lacks_room(error)
-        told = {**token, "note": note, "left": unfit}
+        release = {**token, "note": note, "left": unfit}
         with contextlib.suppress(RefusalError):
             self._service.patiently(
-                lambda: self._service.post(f"{where}/release", told), self._stopping.is_set
+                lambda: self._service.post(f"{where}/release", release), self._stopping.is_set
             )
         if unfit:
             self._stopping.wait(UNFIT_S)
@@ -225,8 +225,8 @@ def lacks_room(error: BaseException | None) -> bool:
 
 def without_words(record: Record) -> Record:
     """Return a record without the details of its end and events, which may quote a controller; the same if none has."""
-    said = (*record.frames.events, *filter(None, (record.ending,)))
-    if not any(one.detail for one in said):
+    worded = (*record.frames.events, *filter(None, (record.ending,)))
+    if not any(one.detail for one in worded):
         return record
     events = tuple(dataclasses.replace(event, detail="") for event in record.frames.events)
     frames = dataclasses.replace(record.frames, events=events)
@@ -235,28 +235,25 @@ def without_words(record: Record) -> Record:
     )
 
 
-def replay_of(found: Record) -> str:
+def replay_of(record: Record) -> str:
     """Return the page that replays a record, with its score; InputError if it holds no frame."""
     from dubins_traffic.scoring.score import score
     from dubins_traffic.viewer.replay import replay_page
 
-    scored = score(found)
-    told = {
+    scored = score(record)
+    figures = {
         "counted_rounds": scored.counted_rounds,
         "rounds": scored.rounds,
         "collisions": len(scored.collisions),
         "duration_s": scored.duration_s,
     }
-    return replay_page(found.instance, found.frames, found.ending, told, (), scored.verdict)
+    return replay_page(record.instance, record.frames, record.ending, figures, (), scored.verdict)
 
 
 def check_boxes(*, trust: bool) -> None:
     """Refuse to work where this machine can't hold a stranger's program, unless submissions are trusted.
 
-    Raises
-    ------
-    InputError
-        With the layers of the box that are missing.
+    InputError with the layers of the box that are missing.
     """
     if not trust:
         available_layers().require()
@@ -274,8 +271,6 @@ def until_signalled(worker: Worker, *, with_parent: bool = False) -> None:
 
     Parameters
     ----------
-    worker : Worker
-        Which.
     with_parent : bool
         End at once when the process at the other end of standard input has ended.
     """

@@ -17,10 +17,6 @@ def run_over_lcm(
 
     Parameters
     ----------
-    session_plan : SessionPlan
-        The plan of the session.
-    pace : Pace
-        Its clock, and how long drivers are waited for.
     url : str, optional
         An LCM URL; by default that of ``LCM_DEFAULT_URL``, else multicast within this machine.
     wait : bool

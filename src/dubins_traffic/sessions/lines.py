@@ -16,10 +16,6 @@ def run_over_lines(session_plan: SessionPlan, pace: Pace, *, port: int = 0) -> I
 
     Parameters
     ----------
-    session_plan : SessionPlan
-        The plan of the session.
-    pace : Pace
-        Its clock, and how long drivers are waited for.
     port : int
         Port on the loopback interface; 0 takes any free port, which is then printed.
 

@@ -48,27 +48,17 @@ REHEARSAL = 1.2
 class Pace:
     """The pace of a session: its clock, and how long drivers are waited for.
 
-    Parameters
-    ----------
-    lockstep : bool
-        Whether the simulation waits for a command of every remote car in each tick; otherwise it runs in real time.
-    factor : float
-        Speed of simulated time relative to the wall clock, in real time.
-    deadline : float
-        Seconds within which a command must come in lockstep.
-    patience : Patience
-        How long peers are waited for otherwise.
-
-    Raises
-    ------
-    InputError
-        If a value is out of range.
+    InputError if a value is out of range.
     """
 
     lockstep: bool = False
+    """Whether the simulation waits for a command of every remote car in each tick; otherwise it runs in real time."""
     factor: float = 1.0
+    """Speed of simulated time relative to the wall clock, in real time."""
     deadline: float = 5.0
+    """Seconds within which a command must come in lockstep."""
     patience: Patience = field(default_factory=Patience)
+    """How long peers are waited for otherwise."""
 
     def __post_init__(self) -> None:
         """Refuse values of which no clock can be made, before a transport is opened."""
@@ -105,10 +95,8 @@ class SessionPlan:
     def claim(self, transport: str) -> SessionPlan:
         """Return this plan for the transport of that name, after preparing the folder for records.
 
-        Raises
-        ------
-        InputError
-            If the folder holds records that are neither to be removed nor of this session; see `record_folder.claim`.
+        InputError if the folder holds records that are neither to be removed nor of this session; see
+        `record_folder.claim`.
         """
         if self.records is None:
             return self
@@ -273,7 +261,7 @@ def session_plan(
         If an argument or the source is wrong; nothing has been written then.
     """
     check_choice(records, data, overwrite=overwrite, append=append)
-    found = load_runnable(source, rnd=rnd, seed=seed or 0)
+    runnable = load_runnable(source, rnd=rnd, seed=seed or 0)
     if controller is not None:
         controller = controllers.shielded(controller) if shield else controller
         controllers.load(controller)
@@ -281,9 +269,9 @@ def session_plan(
         raise InputError(
             "not a number of trials", file="--trials", value=trials, expected="at least 1, or --endless"
         )
-    supply = _supply(found, seed or 0)
+    supply = _supply(runnable, seed or 0)
     hand_over(supply(0), remote)
-    configuration = found if isinstance(found, Configuration) else None
+    configuration = runnable if isinstance(runnable, Configuration) else None
     if data is not None and configuration is None:
         raise InputError(
             "is for configurations", file="-f", value=os.fspath(data), expected="none of it here"
@@ -326,9 +314,9 @@ def moved_by(supply: Callable[[int], Instance], simulator: str, number: int) -> 
     return replace(supply(number), simulator=simulator)
 
 
-def _supply(found: Configuration | Instance | Record, seed: int) -> Callable[[int], Instance]:
-    if isinstance(found, Configuration):
-        configuration = found
+def _supply(runnable: Configuration | Instance | Record, seed: int) -> Callable[[int], Instance]:
+    if isinstance(runnable, Configuration):
+        configuration = runnable
         return lambda number: draw(configuration, seed, number)
-    instance = found.instance if isinstance(found, Record) else found
+    instance = runnable.instance if isinstance(runnable, Record) else runnable
     return lambda _number: instance

@@ -88,8 +88,8 @@ class TransportEntry:
         if not isinstance(self.runs, str):
             return self.runs
         module, _, name = self.runs.partition(":")
-        found: Any = getattr(import_module(module), name)
-        return found
+        run_session: Any = getattr(import_module(module), name)
+        return run_session
 
 
 CLOCK = Option("--clock", bool, "Publish /clock, and stamp messages with simulated time.", default=False)
@@ -233,7 +233,7 @@ TRANSPORTS: dict[str, TransportEntry] = {
                 metavar="COMMAND",
                 shown="required",
             ),
-            Option("--sandbox", bool, "It runs in a box (docs/sandbox.md).", default=False),
+            Option("--sandbox", bool, "It runs in a box.", default=False),
         ),
     ),
 }

@@ -30,42 +30,28 @@ def quiet(_line: str) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """A session over a transport.
-
-    Parameters
-    ----------
-    link : Link
-        Connects to the drivers in other processes.
-    supply : callable
-        Returns instance number n; called with 0, 1, 2, ... as instances are drawn.
-    trials : int, optional
-        Number of trials after which the session ends; None: never.
-    maestro : Maestro, optional
-        Starts every trial; without one each trial starts when the one before is over.
-    controller : str or Controller
-        Drives the ego if the link does not.
-    remote : tuple of str
-        Names of e-agents that other processes drive, whatever their type says.
-    simulator : Simulator, optional
-        Replaces the simulator that instances name.
-    records : Path, optional
-        Folder for records: ``trial-0000.mcap`` for instance 0, ``trial-0000-1.mcap`` for its first repetition.
-    earlier : Earlier
-        How far an earlier session has come: its ended trials count, and are not run again.
-    say : callable
-        Called with lines for people on what the session does and waits for.
-    """
+    """A session over a transport."""
 
     link: Link
+    """Connects to the drivers in other processes."""
     supply: Callable[[int], Instance]
+    """Returns instance number n; called with 0, 1, 2, ... as instances are drawn."""
     trials: int | None = 1
+    """Number of trials after which the session ends; None: never."""
     maestro: Maestro | None = None
+    """Starts every trial; without one each trial starts when the one before is over."""
     controller: str | Controller = "lanes"
+    """Drives the ego if the link does not."""
     remote: tuple[str, ...] = ()
+    """Names of e-agents that other processes drive, whatever their type says."""
     records: Path | None = None
+    """Folder for records: ``trial-0000.mcap`` for instance 0, ``trial-0000-1.mcap`` for its first repetition."""
     earlier: Earlier = field(default_factory=Earlier)
+    """How far an earlier session has come: its ended trials count, and are not run again."""
     simulator: Simulator | None = None
+    """Replaces the simulator that instances name."""
     say: Callable[[str], None] = quiet
+    """Called with lines for people on what the session does and waits for."""
 
     def which(self, instance: Instance, done: int) -> str:
         """Return the words for the trial of `instance`, which follows `done` others."""
@@ -193,7 +179,7 @@ SHORT = 0.5
 TOPIC = "the other maestro's problem instance"
 
 
-class _Kept:
+class _KeptFrames:
     """A sink that keeps the frames of a trial until its duration is known: when the maestro ends it."""
 
     def __init__(self) -> None:
@@ -237,7 +223,7 @@ def run_under(session: Session, maestro: ForeignMaestro, shortest: float) -> Ite
         drawn = hand_over(session.supply(done), session.remote)
         instance = _await_problem(session, maestro, drawn, session.which(drawn, done))
         session.say(f"{session.which(instance, done)}: begins")
-        kept = _Kept()
+        kept = _KeptFrames()
         result = run_trial(instance, session.controller, sinks=[kept], link=link, simulator=session.simulator)
         yield _settled(result, kept, shortest, record_path(session.records, done, 0))
         check_lost(link)
@@ -292,7 +278,7 @@ def with_problem(instance: Instance, text: str) -> Instance:
     )
 
 
-def _settled(result: Result, kept: _Kept, shortest: float, path: Path | None) -> Result:
+def _settled(result: Result, kept: _KeptFrames, shortest: float, path: Path | None) -> Result:
     """Return the result of a trial, with the duration that is now known, and write its record."""
     ending = result.ending
     seconds = max(1, ending.ticks) / result.instance.problem.rate

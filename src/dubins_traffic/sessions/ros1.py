@@ -37,10 +37,6 @@ def run_over_ros1(
 
     Parameters
     ----------
-    session_plan : SessionPlan
-        What is run.
-    pace : Pace
-        How drivers are waited for.
     master : bool
         Whether a master is started on the loopback interface; else the one of ``ROS_MASTER_URI`` is joined.
     port : int

@@ -37,10 +37,6 @@ def run_over_ros2(
 
     Parameters
     ----------
-    session_plan : SessionPlan
-        What is run.
-    pace : Pace
-        How drivers are waited for.
     domain : int, optional
         Number of the DDS domain; by default that of ``ROS_DOMAIN_ID``, else 0.
     wide : bool

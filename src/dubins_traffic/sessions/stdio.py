@@ -22,10 +22,6 @@ def run_over_stdio(
 
     Parameters
     ----------
-    session_plan : SessionPlan
-        The plan of the session.
-    pace : Pace
-        Its clock, and how long drivers are waited for.
     program : str
         The command line that is started for each remote car in each trial; in a box what `submission.program_of` takes.
     sandbox : bool

@@ -118,14 +118,16 @@ def file_name(suite: Suite, trials: int | None) -> str:
 def save_trials(suite: Suite, campaign: Campaign, folder: Path) -> Path:
     """Write the results of a finished campaign beside its table, with the seconds in a file of their own."""
     known = manifest.read(folder) or {}
-    found = table.read(folder, campaign, [])
+    results_table = table.read(folder, campaign, [])
     clock = table.read(folder, campaign, [], table.Kind.WALL)
     entries: list[dict[str, Any]] = []
     seconds: dict[str, dict[str, Any]] = {}
     for k, name in enumerate(campaign.controllers):
-        own = [place for place, one in enumerate(found["controller"].to_pylist()) if one == name]
-        picked, times = found.take(own), clock.take(own)
-        share = [STRATEGY_SHARE] if STRATEGY_SHARE in found.column_names else []
+        places_of_one = [
+            place for place, one in enumerate(results_table["controller"].to_pylist()) if one == name
+        ]
+        picked, times = results_table.take(places_of_one), clock.take(places_of_one)
+        share = [STRATEGY_SHARE] if STRATEGY_SHARE in results_table.column_names else []
         columns = played({column: picked[column].to_pylist() for column in (*KEPT, *share)})
         file, where = known["controllers"][k]["file"], ran(campaign.places[k])
         entries.append({"controller": name, "file": file, "ran": where, "columns": columns})
@@ -142,7 +144,7 @@ def played(columns: Mapping[str, Sequence[Any]]) -> dict[str, Sequence[Any]]:
     }
 
 
-def save(suite: Suite, folder: Path, found: Mapping[str, Any], seconds: Mapping[str, Any]) -> Path:
+def save(suite: Suite, folder: Path, entries: Mapping[str, Any], seconds: Mapping[str, Any]) -> Path:
     """Write a file of results and that of the seconds; return the path of the first."""
     document: dict[str, Any] = {
         "format": FORMAT,
@@ -152,7 +154,7 @@ def save(suite: Suite, folder: Path, found: Mapping[str, Any], seconds: Mapping[
         "trials": None,
         "package": manifest.package_version(),
         "code": sources_hash(),
-        **found,
+        **entries,
     }
     path = folder / file_name(suite, document["trials"])
     clock = {"format": WALL_FORMAT, "version": 0, "hash": suite.hash, **seconds}
@@ -171,13 +173,13 @@ def find_results(place: str) -> Path:
     path = Path(place)
     if not path.is_dir():
         return path
-    found = [each for each in sorted(path.glob("*.json")) if _is_result(each)]
-    if len(found) != 1:
-        problem = "several files of results" if found else "no results of a suite"
+    files_of_results = [each for each in sorted(path.glob("*.json")) if _is_result(each)]
+    if len(files_of_results) != 1:
+        problem = "several files of results" if files_of_results else "no results of a suite"
         raise InputError(
             problem, file=place, expected="the folder of `suite run` when it is finished, or a file"
         )
-    return found[0]
+    return files_of_results[0]
 
 
 def _is_result(path: Path) -> bool:
@@ -190,21 +192,18 @@ def _is_result(path: Path) -> bool:
 def load_results(path: Path) -> tuple[ResultModel, WallModel | None]:
     """Return the results in a file, and the seconds beside it if they are there.
 
-    Raises
-    ------
-    InputError
-        If a file can't be read, or is not as its schema says.
+    InputError if a file can't be read, or is not as its schema says.
     """
-    found = parse(ResultModel, parse_json(read_text(path), str(path)), file=str(path))
+    results = parse(ResultModel, parse_json(read_text(path), str(path)), file=str(path))
     beside = wall_path(path)
     if not is_file(beside):
-        return found, None
+        return results, None
     wall = parse(WallModel, parse_json(read_text(beside), str(beside)), file=str(beside))
-    if wall.hash != found.hash:
+    if wall.hash != results.hash:
         raise InputError(
-            "seconds of another suite", file=str(beside), field="hash", value=wall.hash, expected=found.hash
+            "seconds of another suite", file=str(beside), field="hash", value=wall.hash, expected=results.hash
         )
-    return found, wall
+    return results, wall
 
 
 def part(
@@ -214,8 +213,6 @@ def part(
 
     Parameters
     ----------
-    columns : Mapping
-        Their results, the columns `KEPT`.
     seconds : Mapping or None
         The wall-clock figures, if there are any.
     numbers : sequence of int
@@ -278,7 +275,7 @@ class Source:
 
     path: Path
     name: str
-    found: ResultModel
+    results: ResultModel
     wall: WallModel | None
 
 
@@ -292,16 +289,16 @@ def open_sources(places: Sequence[str]) -> list[Source]:
         name, _, path = ("", "", place) if exists(place) else place.rpartition("=")
         file = find_results(path)
         sources.append(Source(file, name, *load_results(file)))
-    first = sources[0].found
+    first = sources[0].results
     for source in sources[1:]:
         for field in ("suite", "hash", "trials"):
-            own, wanted = getattr(source.found, field), getattr(first, field)
-            if own != wanted:
+            there, wanted = getattr(source.results, field), getattr(first, field)
+            if there != wanted:
                 raise InputError(
                     "results of another suite" if field != "trials" else "results of other trials",
                     file=str(source.path),
                     field=field,
-                    value=own,
+                    value=there,
                     expected=f"{wanted}, as in {sources[0].path}",
                 )
     return sources
@@ -309,13 +306,13 @@ def open_sources(places: Sequence[str]) -> list[Source]:
 
 def check_suite(suite: Suite, sources: Sequence[Source]) -> None:
     """Raise InputError unless results are of a suite as it is here."""
-    found = sources[0].found
-    if found.hash != suite.hash:
+    results = sources[0].results
+    if results.hash != suite.hash:
         raise InputError(
             "results of another suite than the one of that name here",
             file=str(sources[0].path),
             field="hash",
-            value=found.hash,
+            value=results.hash,
             expected=suite.hash,
         )
 
@@ -324,9 +321,11 @@ def made_by(sources: Sequence[Source]) -> str:
     """Return a sentence on the versions of the code that made results, each with what it made if there are several."""
     made: dict[tuple[str, str], list[str]] = {}
     for source in sources:
-        own = [entry.controller for entry in source.found.entries]
-        own += [entry.solver for entry in source.found.solvers]
-        made.setdefault((source.found.package, source.found.code), []).append(source.name or ", ".join(own))
+        names_of_source = [entry.controller for entry in source.results.entries]
+        names_of_source += [entry.solver for entry in source.results.solvers]
+        made.setdefault((source.results.package, source.results.code), []).append(
+            source.name or ", ".join(names_of_source)
+        )
     versions = [f"dubins-traffic {package} (sources {code[:SHORT]})" for package, code in made]
     if len(made) == 1:
         return f"Made by {versions[0]}."
@@ -335,11 +334,11 @@ def made_by(sources: Sequence[Source]) -> str:
     return f"Made by different versions of the code, in which trials may go differently: {listed}."
 
 
-def entry_name(source: Source, own: str, count: int) -> str:
+def entry_name(source: Source, name: str, count: int) -> str:
     """Return what an entry of a source is called: NAME, with its own name where the file has several."""
     if not source.name:
-        return own
-    return source.name if count == 1 else f"{source.name} {own}"
+        return name
+    return source.name if count == 1 else f"{source.name} {name}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -369,7 +368,7 @@ def compare_trials(suite: Suite, sources: Sequence[Source]) -> tuple[Comparison,
     check_suite(suite, sources)
     named = named_entries(sources)
     names = [one.name for one in named]
-    campaign = suite.campaign(names, sources[0].found.trials, places=tuple(names))
+    campaign = suite.campaign(names, sources[0].results.trials, places=tuple(names))
     parts = [_part(campaign, k, one) for k, one in enumerate(named)]
     whole = rows.arrow().concat_tables(parts).sort_by("number")
     timed = any(source.wall is not None for source in sources)
@@ -380,16 +379,16 @@ def compare_trials(suite: Suite, sources: Sequence[Source]) -> tuple[Comparison,
 
 def named_entries(sources: Sequence[Source]) -> list[Named]:
     """Return the entries of all sources, named; InputError if a name stands twice."""
-    found: list[Named] = []
+    entries: list[Named] = []
     for source in sources:
-        for entry in source.found.entries:
-            name = entry_name(source, entry.controller, len(source.found.entries))
-            if any(name == other.name for other in found):
+        for entry in source.results.entries:
+            name = entry_name(source, entry.controller, len(source.results.entries))
+            if any(name == other.name for other in entries):
                 raise InputError(
                     "name taken", file=str(source.path), value=name, expected="NAME=PATH with another name"
                 )
-            found.append(Named(name, entry, source))
-    return found
+            entries.append(Named(name, entry, source))
+    return entries
 
 
 def shares(sources: Sequence[Source]) -> list[str]:
@@ -412,11 +411,11 @@ def shares(sources: Sequence[Source]) -> list[str]:
 
 def where_they_ran(sources: Sequence[Source]) -> str:
     """Return a sentence on which entries ran in a process that trusts them and which in a box; empty without any."""
-    found: dict[str, list[str]] = {}
+    names_by_place: dict[str, list[str]] = {}
     for one in named_entries(sources):
-        found.setdefault(one.entry.ran or "not said", []).append(one.name)
-    listed = "; ".join(f"{where}: {', '.join(found[where])}" for where in sorted(found))
-    return f"Where they ran: {listed}." if found else ""
+        names_by_place.setdefault(one.entry.ran or "not said", []).append(one.name)
+    listed = "; ".join(f"{where}: {', '.join(names_by_place[where])}" for where in sorted(names_by_place))
+    return f"Where they ran: {listed}." if names_by_place else ""
 
 
 def _part(campaign: Campaign, index: int, one: Named) -> Any:
@@ -433,13 +432,13 @@ def _part(campaign: Campaign, index: int, one: Named) -> Any:
 
 
 def _made(suite: Suite, named: Sequence[Named]) -> Mapping[str, Any]:
-    codes = {one.source.found.code: one.source.found.package for one in named}
+    codes = {one.source.results.code: one.source.results.package for one in named}
     (code, package), *others = codes.items()
     versions = {"suite": suite.name, "dubins-traffic": package}
     versions |= {f"{one.name} ran": one.entry.ran for one in named if one.entry.ran is not None}
     for one in named:
-        if one.source.found.code in dict(others):
-            versions[f"code of {one.name}"] = f"{one.source.found.code} ({one.source.found.package})"
+        if one.source.results.code in dict(others):
+            versions[f"code of {one.name}"] = f"{one.source.results.code} ({one.source.results.package})"
     return {
         "versions": versions,
         "campaign": suite.hash,

@@ -37,10 +37,10 @@ from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.scoring.registry import STRATEGY_SHARE
 from dubins_traffic.suites.results import KEPT, GameResult, played, save, save_trials
 from dubins_traffic.suites.suite import CaseEntry, GameEntry, Suite
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build, save_game
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.solver import solve
 
 CASES_FILE: Final = "cases.jsonl"
@@ -101,27 +101,30 @@ def run_cases(
     make_folder(folder, "results", begun=resume)
     with locked(folder):
         file = folder / CASES_FILE
-        found = _kept_cases(file, suite) if file.exists() else {}
+        known = _kept_cases(file, suite) if file.exists() else {}
         if file.exists() and not resume:
             raise InputError(
                 "holds results", file=str(folder), expected="a new folder; --resume goes on with it"
             )
-        _run(suite, file, instances, specs, found, workers, progress or (lambda _done, _total: None))
-        named = {bare_name(spec): found[bare_name(spec)] for spec in specs}
+        _run(suite, file, instances, specs, known, workers, progress or (lambda _done, _total: None))
+        named = {bare_name(spec): known[bare_name(spec)] for spec in specs}
         columns = {
-            name: {column: [own[case][column] for case in instances] for column in COLUMNS}
-            for name, own in named.items()
+            name: {column: [its_rows[case][column] for case in instances] for column in COLUMNS}
+            for name, its_rows in named.items()
         }
         listed = [
             {
                 "controller": name,
                 "file": hash_of_file(spec),
                 "ran": controllers.ran(spec),
-                "columns": played({column: own[column] for column in (*KEPT, STRATEGY_SHARE)}),
+                "columns": played({column: its_columns[column] for column in (*KEPT, STRATEGY_SHARE)}),
             }
-            for (name, own), spec in zip(columns.items(), specs, strict=True)
+            for (name, its_columns), spec in zip(columns.items(), specs, strict=True)
         ]
-        seconds = {name: {column: own[column] for column in rows.WALL} for name, own in columns.items()}
+        seconds = {
+            name: {column: its_columns[column] for column in rows.WALL}
+            for name, its_columns in columns.items()
+        }
         return save(suite, folder, {"entries": listed}, {"entries": seconds})
 
 
@@ -130,7 +133,7 @@ def _run(
     file: Path,
     instances: Mapping[str, Instance],
     specs: Sequence[str],
-    found: Found,
+    known: Found,
     workers: int,
     progress: Callable[[int, int], object],
 ) -> None:
@@ -138,25 +141,25 @@ def _run(
     cases = {_key(instance): name for name, instance in instances.items()}
     total = len(specs) * len(instances)
     for spec in specs:
-        own = found.setdefault(bare_name(spec), {})
-        left = [instance for name, instance in instances.items() if name not in own]
+        rows_of_case = known.setdefault(bare_name(spec), {})
+        left = [instance for name, instance in instances.items() if name not in rows_of_case]
         metrics = scores.with_share((), [spec])
         jobs = [Job(one.trial or 0, one.seed or 0, spec, instance=one, metrics=metrics) for one in left]
         for result in run_trials(jobs, workers):
             row = rows.row(0, result.ending, result.score, result.wall.act_s)
-            own[cases[_key(result.instance)]] = {column: row.get(column) for column in COLUMNS}
-            _keep_cases(file, suite, found)
-            progress(sum(map(len, found.values())), total)
+            rows_of_case[cases[_key(result.instance)]] = {column: row.get(column) for column in COLUMNS}
+            _keep_cases(file, suite, known)
+            progress(sum(map(len, known.values())), total)
 
 
 def faulty(folder: Path, suite: Suite) -> str:
     """Return the notice that cases in a folder ended by a fault; empty if none did."""
     ended = [
         (f"{case} with {name}: {row['end']}: {row['reason'] or ''}".rstrip(": "), row["end"])
-        for name, own in _kept_cases(folder / CASES_FILE, suite).items()
-        for case, row in own.items()
+        for name, its_rows in _kept_cases(folder / CASES_FILE, suite).items()
+        for case, row in its_rows.items()
     ]
-    bad = [(told, end) for told, end in ended if end in FAULTS]
+    bad = [(line, end) for line, end in ended if end in FAULTS]
     return fault_notice(Counter(end for _, end in bad), len(ended), bad[0][0] if bad else "")
 
 
@@ -164,12 +167,12 @@ def _key(instance: Instance) -> str:
     return json.dumps(instance_to_document(instance), sort_keys=True)
 
 
-def _keep_cases(file: Path, suite: Suite, found: Found) -> None:
+def _keep_cases(file: Path, suite: Suite, known: Found) -> None:
     lines: list[Mapping[str, Any]] = [{"hash": suite.hash}]
     lines += [
         {"controller": name, "case": case, "row": row}
-        for name, own in found.items()
-        for case, row in own.items()
+        for name, its_rows in known.items()
+        for case, row in its_rows.items()
     ]
     write_text(file, "".join(json.dumps(line) + "\n" for line in lines))
 
@@ -180,12 +183,12 @@ def _kept_cases(file: Path, suite: Suite) -> Found:
         first, *rest = [json.loads(line) for line in read_text(file).splitlines()]
         if first != {"hash": suite.hash}:
             raise InputError("results of another suite", file=str(file), expected="a new folder")
-        found: Found = {}
+        known: Found = {}
         for line in rest:
             if line["row"].keys() != set(COLUMNS):
                 raise KeyError("row")
-            found.setdefault(line["controller"], {})[line["case"]] = line["row"]
-        return found
+            known.setdefault(line["controller"], {})[line["case"]] = line["row"]
+        return known
     except (ValueError, KeyError, TypeError, AttributeError):
         raise InputError("can't be read as results", file=str(file), expected="a new folder") from None
 
@@ -211,8 +214,8 @@ class Solver:
             begun = perf_counter()
             solution = solve(build(board_of(entry)))
             winning, positions = int(solution.winning.sum()), solution.game.positions
-            found = GameResult(positions=positions, winning=winning, realizable=solution.everywhere)
-            return found, perf_counter() - begun
+            result = GameResult(positions=positions, winning=winning, realizable=solution.everywhere)
+            return result, perf_counter() - begun
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / f"{entry.name}.npz"
             save_game(build(board_of(entry)), path)
@@ -250,8 +253,8 @@ def _answer(printed: str) -> GameResult:
     """Return what a solver has printed: JSON on its last line."""
     line = (printed.strip().splitlines() or [""])[-1]
     try:
-        said: Any = json.loads(line)
-        known = {name: said[name] for name in ("positions", "winning", "realizable") if name in said}
+        answer: Any = json.loads(line)
+        known = {name: answer[name] for name in ("positions", "winning", "realizable") if name in answer}
         if "winning" not in known and "realizable" not in known:
             raise ValueError
         return GameResult.model_validate(known)
@@ -265,18 +268,18 @@ def board_of(entry: GameEntry) -> Board:
     network = RoadNetwork.from_document(entry.rnd)
     goals = [network.vertex((x, y)) for x, y in entry.goals]
     words = [word for word in entry.assume.split(",") if word]
-    return Board(Arena.of(network, goals, entry.order_degree), Assumption.parse(words), entry.cars)
+    return Board(RoadCells.of(network, goals, entry.order_degree), Assumption.parse(words), entry.cars)
 
 
-def agrees(entry: GameEntry, found: GameResult) -> bool | None:
+def agrees(entry: GameEntry, result: GameResult) -> bool | None:
     """Say whether an answer is right; None where there is none."""
     everywhere = entry.winning == entry.positions
     checks = [
         wanted == given
         for wanted, given in (
-            (entry.positions, found.positions),
-            (entry.winning, found.winning),
-            (everywhere, found.realizable),
+            (entry.positions, result.positions),
+            (entry.winning, result.winning),
+            (everywhere, result.realizable),
         )
         if given is not None
     ]
@@ -322,7 +325,7 @@ def run_games(
                 _keep_games(file, suite, solver, answers)
         if progress is not None:
             progress(len(games), len(games))
-        results = {name: found.model_dump() for name, (found, _) in answers.items()}
+        results = {name: result.model_dump() for name, (result, _) in answers.items()}
         seconds = {name: spent for name, (_, spent) in answers.items()}
         return save(
             suite,
@@ -337,7 +340,7 @@ def _keep_games(
 ) -> None:
     lines: list[dict[str, Any]] = [{"hash": suite.hash, "solver": solver.name, "command": solver.command}]
     lines += [
-        {"game": name, "seconds": s, "answer": found.model_dump()} for name, (found, s) in answers.items()
+        {"game": name, "seconds": s, "answer": result.model_dump()} for name, (result, s) in answers.items()
     ]
     write_text(file, "".join(json.dumps(line) + "\n" for line in lines))
 
@@ -346,8 +349,8 @@ def _kept_games(file: Path, suite: Suite, solver: Solver) -> dict[str, tuple[Gam
     """Return the answers that are kept in a folder; InputError if they are of another suite or solver."""
     try:
         first, *rest = [json.loads(line) for line in read_text(file).splitlines()]
-        own = {"hash": suite.hash, "solver": solver.name, "command": solver.command}
-        if first != own:
+        head = {"hash": suite.hash, "solver": solver.name, "command": solver.command}
+        if first != head:
             raise InputError("answers of another suite or solver", file=str(file), expected="a new folder")
         return {
             each["game"]: (GameResult.model_validate(each["answer"]), float(each["seconds"])) for each in rest

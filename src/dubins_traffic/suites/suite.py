@@ -97,27 +97,20 @@ class SuiteModel(Strict):
 
 @dataclass(frozen=True)
 class Suite:
-    """A checked suite.
-
-    Attributes
-    ----------
-    document : Mapping
-        What its file says.
-    model : SuiteModel
-        The same, checked, with defaults.
-    file : str or None
-        The file from which it was read; None for a shipped suite.
-    """
+    """A checked suite."""
 
     document: Mapping[str, Any]
+    """What its file says."""
     model: SuiteModel
+    """The same, checked, with defaults."""
     file: str | None = field(default=None, compare=False)
+    """The file from which it was read; None for a shipped suite."""
 
     @staticmethod
     def from_document(document: Mapping[str, Any], file: str | None = None) -> Suite:
         """Check a document; InputError for the first thing wrong, with its field."""
-        own = plain(document, file)
-        suite = Suite(own, parse(SuiteModel, own, file=file), file)
+        plain_document = plain(document, file)
+        suite = Suite(plain_document, parse(SuiteModel, plain_document, file=file), file)
         if suite.model.campaign is not None:
             for k, entry in enumerate(suite.model.campaign.configurations):
                 if entry.document is None:
@@ -138,12 +131,12 @@ class Suite:
     @property
     def hash(self) -> str:
         """SHA-256 of all that determines problems and scores: without its title and the page's controllers."""
-        told = {name: value for name, value in self.document.items() if name not in _TOLD}
-        if "campaign" in told:
-            told["campaign"] = {
-                name: value for name, value in told["campaign"].items() if name != "controllers"
+        decides = {name: value for name, value in self.document.items() if name not in _TOLD}
+        if "campaign" in decides:
+            decides["campaign"] = {
+                name: value for name, value in decides["campaign"].items() if name != "controllers"
             }
-        return hashlib.sha256(json.dumps(told, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+        return hashlib.sha256(json.dumps(decides, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
     @property
     def label(self) -> str:
@@ -167,8 +160,6 @@ class Suite:
 
         Parameters
         ----------
-        controllers : sequence of str
-            The controllers to run.
         trials : int, optional
             Number of trials of each combination, if only the first ones are to be run.
         places : tuple of str, optional
@@ -179,15 +170,15 @@ class Suite:
         InputError
             If the suite is one of games, a controller can't be loaded, or it has not so many trials.
         """
-        own = self.document.get("campaign")
-        if own is None or self.trials is None:
+        template = self.document.get("campaign")
+        if template is None or self.trials is None:
             raise InputError("a suite of another kind, which is no campaign", file=self.file or self.name)
         if trials is not None and not 1 <= trials <= self.trials:
             raise InputError(
                 "not a number of its trials", file="--trials", value=trials, expected=f"1 to {self.trials}"
             )
         document = {
-            **own,
+            **template,
             "name": self.label,
             "trials": trials or self.trials,
             "controllers": list(controllers),
@@ -197,8 +188,8 @@ class Suite:
 
 def shipped_suites() -> list[str]:
     """Return the names of the suites that are shipped."""
-    found = (item.name for item in (files("dubins_traffic.suites") / "data").iterdir())
-    return sorted(name.removesuffix(".json") for name in found if name.endswith(".json"))
+    items = (item.name for item in (files("dubins_traffic.suites") / "data").iterdir())
+    return sorted(name.removesuffix(".json") for name in items if name.endswith(".json"))
 
 
 def load_suite(name: str | os.PathLike[str]) -> Suite:

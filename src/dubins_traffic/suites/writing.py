@@ -41,27 +41,29 @@ Columns = Mapping[str, Sequence[Any]]
 
 @dataclass(frozen=True, slots=True)
 class Answers:
-    """The answers of one solver: `found` and `seconds`, by the names of the games."""
+    """The answers of one solver: `results` and `seconds`, by the names of the games."""
 
     name: str
-    found: Mapping[str, GameResult]
+    results: Mapping[str, GameResult]
     seconds: Mapping[str, float]
 
 
 def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
     """Return the files of results by name: `PAGE`, `TABLE`, and of a suite of trials CSV; same sources, same texts.
 
-    Raises
-    ------
-    InputError
-        As `compare_trials`, `columns_of` and `answers_of`.
+    InputError as `compare_trials`, `columns_of` and `answers_of`.
     """
-    told = [line for line in (where_they_ran(sources), made_by(sources)) if line]
-    how = " ".join(told)
-    note = "".join(f"\n{line}\n" for line in (*shares(sources), *told))
+    how_lines = [line for line in (where_they_ran(sources), made_by(sources)) if line]
+    how = " ".join(how_lines)
+    note = "".join(f"\n{line}\n" for line in (*shares(sources), *how_lines))
     if suite.model.cases is not None:
-        found = columns_of(suite, sources)
-        head, body, summary, made = ["case", *found], _case_lines(suite, found), "", {"hash": suite.hash}
+        columns_by_name = columns_of(suite, sources)
+        head, body, summary, made = (
+            ["case", *columns_by_name],
+            _case_lines(suite, columns_by_name),
+            "",
+            {"hash": suite.hash},
+        )
     elif suite.model.games is not None:
         answers = answers_of(suite, sources)
         head, body, summary = _game_columns(answers), _game_lines(suite, answers), _summary(suite, answers)
@@ -84,27 +86,23 @@ def results(suite: Suite, sources: Sequence[Source]) -> dict[str, str]:
         made=made,
         how=how,
     )
-    told = f"# {suite.name}\n\n{suite.model.title}. Hash `{suite.hash}`.\n\n{markdown_table(head, body)}"
-    return {TABLE: told + (f"\n{summary}\n" if summary else "") + note, PAGE: whole}
+    text = f"# {suite.name}\n\n{suite.model.title}. Hash `{suite.hash}`.\n\n{markdown_table(head, body)}"
+    return {TABLE: text + (f"\n{summary}\n" if summary else "") + note, PAGE: whole}
 
 
 def write_results(suite: Suite, sources: Sequence[Source], folder: Path, *, overwrite: bool = False) -> str:
     """Write the files of results into a folder and return the table in Markdown.
 
-    Files that are there are replaced only if `overwrite` is given.
-
-    Raises
-    ------
-    InputError
-        As `results`, if a path is refused (`files.require_output`), or if a file can't be written.
+    Files that are there are replaced only if `overwrite` is given. InputError as `results`, if a path is refused
+    (`files.require_output`), or if a file can't be written.
     """
-    found = results(suite, sources)
+    texts = results(suite, sources)
     make_folder(folder, "results")
-    for name in found:
+    for name in texts:
         require_output(folder / name, "results", [Path(name).suffix], overwrite=overwrite)
-    for name, text in found.items():
+    for name, text in texts.items():
         write_text(folder / name, text)
-    return found[TABLE]
+    return texts[TABLE]
 
 
 def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
@@ -116,7 +114,7 @@ def markdown_table(head: Sequence[str], body: Sequence[Sequence[str]]) -> str:
 def trials_table(suite: Suite, comparison: Comparison) -> str:
     """Return a heading, the table of the controllers, the best by the suite's metric first, and how to read it."""
     metric = SCORES[suite.model.metric].column
-    timed = [own for own in WALL_METRICS if own in comparison.metrics]
+    timed = [metric_of_time for metric_of_time in WALL_METRICS if metric_of_time in comparison.metrics]
     judged = any(standing.judged for standing in comparison.standings)
     verdicts = [ruling.value for ruling in Ruling] if judged else []
     head = [
@@ -132,11 +130,11 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
         "fault of the ego",
         "ended by the controller",
         "came to nothing",
-        *(f"{own.label}, ms" for own in timed),
+        *(f"{metric_of_time.label}, ms" for metric_of_time in timed),
     ]
     ranked = sorted(
         comparison.standings,
-        key=lambda own: [_over_all(own, name) for name in (metric.name, SECOND)],
+        key=lambda of_controller: [_over_all(of_controller, name) for name in (metric.name, SECOND)],
         reverse=True,
     )
     body = [
@@ -155,14 +153,14 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
             str(standing.faults["the ego"] + standing.faults["both"]),
             str(standing.ended.count),
             str(sum(standing.ends[end].count for end in rows.NOTHING if end in standing.ends)),
-            *(_milliseconds(standing.estimates[own.name].mean) for own in timed),
+            *(_milliseconds(standing.estimates[metric_of_time.name].mean) for metric_of_time in timed),
         ]
         for standing in ranked
     ]
     count = comparison.campaign.cells[0].count
     fewer = "" if count == suite.trials else f", {count} of {suite.trials} trials of each combination"
-    told = f"# {suite.name}{fewer}\n\n{suite.model.title}. Hash `{suite.hash}`."
-    return f"{told}\n\n{markdown_table(head, body)}\n{NOTE}\n"
+    heading = f"# {suite.name}{fewer}\n\n{suite.model.title}. Hash `{suite.hash}`."
+    return f"{heading}\n\n{markdown_table(head, body)}\n{NOTE}\n"
 
 
 def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
@@ -172,7 +170,7 @@ def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
     """
     check_suite(suite, sources)
     count = len(suite.model.cases or ())
-    found: dict[str, Columns] = {}
+    columns_by_name: dict[str, Columns] = {}
     for one in named_entries(sources):
         columns = one.entry.columns
         for name in ("end", "verdict", "clean", "breaches"):
@@ -183,31 +181,34 @@ def columns_of(suite: Suite, sources: Sequence[Source]) -> dict[str, Columns]:
                     field=f"{one.entry.controller}.columns.{name}",
                     expected=f"{count} values",
                 )
-        found[one.name] = columns
-    return found
+        columns_by_name[one.name] = columns
+    return columns_by_name
 
 
 def answers_of(suite: Suite, sources: Sequence[Source]) -> list[Answers]:
     """Return the answers in files of results; InputError if the suite is another one here, or a name stands twice."""
     check_suite(suite, sources)
-    found: list[Answers] = []
+    answers: list[Answers] = []
     for source in sources:
-        for entry in source.found.solvers:
-            name = entry_name(source, entry.solver, len(source.found.solvers))
-            if any(name == other.name for other in found):
+        for entry in source.results.solvers:
+            name = entry_name(source, entry.solver, len(source.results.solvers))
+            if any(name == other.name for other in answers):
                 raise InputError(
                     "name taken", file=str(source.path), value=name, expected="NAME=PATH with another name"
                 )
             seconds = {} if source.wall is None else source.wall.solvers.get(entry.solver, {})
-            found.append(Answers(name, entry.games, seconds))
-    return found
+            answers.append(Answers(name, entry.games, seconds))
+    return answers
 
 
-def _case_lines(suite: Suite, found: Mapping[str, Columns]) -> list[list[str]]:
+def _case_lines(suite: Suite, columns_by_name: Mapping[str, Columns]) -> list[list[str]]:
     cases = suite.model.cases or ()
-    rows = [[case.name, *(_said(own, k) for own in found.values())] for k, case in enumerate(cases)]
-    ended = ["ended by the controller", *(str(_ended(own)) for own in found.values())]
-    return [*rows, ["clean", *(_clean(own) for own in found.values())], ended]
+    rows = [
+        [case.name, *(_said(columns, k) for columns in columns_by_name.values())]
+        for k, case in enumerate(cases)
+    ]
+    ended = ["ended by the controller", *(str(_ended(columns)) for columns in columns_by_name.values())]
+    return [*rows, ["clean", *(_clean(columns) for columns in columns_by_name.values())], ended]
 
 
 def _said(columns: Columns, case: int) -> str:
@@ -224,14 +225,14 @@ def _ended(columns: Columns) -> int:
 
 def _clean(columns: Columns) -> str:
     cut = sum(map(was_cut, columns["verdict"], columns["clean"], columns["end"]))
-    own = share(sum(bool(value) for value in columns["clean"]), len(columns["clean"]) - cut)
-    low, high = own.interval or (0.0, 1.0)
-    return f"{own.count} of {own.total} [{low:.1%}, {high:.1%}]{told_cut(cut)}"
+    clean = share(sum(bool(value) for value in columns["clean"]), len(columns["clean"]) - cut)
+    low, high = clean.interval or (0.0, 1.0)
+    return f"{clean.count} of {clean.total} [{low:.1%}, {high:.1%}]{told_cut(cut)}"
 
 
 def _game_columns(answers: Sequence[Answers]) -> list[str]:
     head = ["game", "e-agents", "assumed", "positions", "won", "realizable"]
-    return head + [f"{own.name}{what}" for own in answers for what in ("", ", s")]
+    return head + [f"{solver.name}{what}" for solver in answers for what in ("", ", s")]
 
 
 def _game_lines(suite: Suite, answers: Sequence[Answers]) -> list[list[str]]:
@@ -243,7 +244,7 @@ def _game_lines(suite: Suite, answers: Sequence[Answers]) -> list[list[str]]:
             f"{game.positions:,}",
             f"{game.winning:,}",
             _realizable(game),
-            *(cell for own in answers for cell in _verdict_and_seconds(game, own)),
+            *(cell for solver in answers for cell in _verdict_and_seconds(game, solver)),
         ]
         for game in suite.model.games or ()
     ]
@@ -255,27 +256,27 @@ def _realizable(game: GameEntry) -> str:
     return "somewhere" if game.winning else "nowhere"
 
 
-def _verdict_and_seconds(game: GameEntry, own: Answers) -> tuple[str, str]:
-    found = own.found.get(game.name)
-    right = None if found is None else agrees(game, found)
-    return RIGHT[right], shown(own.seconds.get(game.name))
+def _verdict_and_seconds(game: GameEntry, solver: Answers) -> tuple[str, str]:
+    answer = solver.results.get(game.name)
+    right = None if answer is None else agrees(game, answer)
+    return RIGHT[right], shown(solver.seconds.get(game.name))
 
 
 def _summary(suite: Suite, answers: Sequence[Answers]) -> str:
     games = suite.model.games or ()
     lines: list[str] = []
-    for own in answers:
-        right = sum(_verdict_and_seconds(game, own)[0] == RIGHT[True] for game in games)
-        spent = sum(own.seconds.get(game.name, 0.0) for game in games)
-        took = f" in {shown(spent)} s" if own.seconds else ""
-        lines.append(f"{own.name}: {right} of {len(games)} right{took}.")
+    for solver in answers:
+        right = sum(_verdict_and_seconds(game, solver)[0] == RIGHT[True] for game in games)
+        spent = sum(solver.seconds.get(game.name, 0.0) for game in games)
+        took = f" in {shown(spent)} s" if solver.seconds else ""
+        lines.append(f"{solver.name}: {right} of {len(games)} right{took}.")
     return " ".join(lines)
 
 
 def _over_all(standing: Standing, name: str) -> float:
     """Return the mean of a column over all trials; one that came to nothing counts 0, so no crash hides a trial."""
-    found = standing.estimates[name]
-    return (found.mean or 0.0) * found.count / max(1, standing.trials)
+    estimate = standing.estimates[name]
+    return (estimate.mean or 0.0) * estimate.count / max(1, standing.trials)
 
 
 def _sum(estimate: Estimate) -> float | None:

@@ -17,7 +17,7 @@ from dubins_traffic.synthesis.assumption import WORDS, Assumption, part_of
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy, story_of
 from dubins_traffic.synthesis.game import Progress, build
-from dubins_traffic.synthesis.instance import arena_of, assumption_of, start_positions
+from dubins_traffic.synthesis.instance import assumption_of, cells_of, start_positions
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Ranks, Solution, solve
 
@@ -37,20 +37,20 @@ def strengthenings(assumption: Assumption, count: int, *, bends: bool) -> Iterat
     Those with the same parts come together, the weak ones first. `bends`: whether there are any.
     """
     words = dict.fromkeys(part_of(word) for word in WORDS)
-    own = {part_of(word): word for word in assumption.words()}
-    ladders_of = {part: [*_ladder(part, own.get(part), bends)] for part in words}
+    word_of = {part_of(word): word for word in assumption.words()}
+    ladders_of = {part: [*_ladder(part, word_of.get(part), bends)] for part in words}
     for parts in combinations((part for part in words if ladders_of[part]), count):
         ladders = [ladders_of[part] for part in parts]
         yield (
-            Assumption.parse((own | dict(zip(parts, steps, strict=True))).values())
+            Assumption.parse((word_of | dict(zip(parts, steps, strict=True))).values())
             for steps in product(*ladders)
         )
 
 
-def _ladder(part: str, own: str | None, bends: bool) -> Iterator[str]:
+def _ladder(part: str, word: str | None, bends: bool) -> Iterator[str]:
     """Yield the words of a part that are stronger than its own, the weak ones first."""
     steps = STEPS.get(part, (part,))
-    for step in steps[steps.index(own) + 1 if own in steps else 0 :]:
+    for step in steps[steps.index(word) + 1 if word in steps else 0 :]:
         if bends or step not in BENDS_ALONE:
             yield step
 
@@ -80,17 +80,17 @@ def smallest(
     """
 
     def wins(assumption: Assumption) -> bool:
-        game = build(Board(board.arena, assumption, board.others), limit=limit, progress=progress)
+        game = build(Board(board.road_cells, assumption, board.others), limit=limit, progress=progress)
         return wanted(solve(game, progress=progress))
 
-    bends = not all(node.crossing for node in board.arena.nodes)
+    bends = not all(node.crossing for node in board.road_cells.nodes)
     parts = len({part_of(word) for word in WORDS})
     for count in range(1, parts + 1):
         ladders = strengthenings(board.assumption, count, bends=bends)
         tried = (next(filter(wins, steps), None) for steps in ladders)
-        found = [assumption for assumption in tried if assumption is not None]
-        if found:
-            return found
+        winning = [assumption for assumption in tried if assumption is not None]
+        if winning:
+            return winning
     return []
 
 
@@ -99,27 +99,18 @@ VACUOUSLY: Final = "vacuously"
 
 @dataclass(frozen=True)
 class Answer:
-    """What synthesis says of an instance.
-
-    Attributes
-    ----------
-    solution : Solution
-        Who wins from which position.
-    instance : Instance
-        Of which it says so.
-    route_bound : int
-        Against how many e-agents an ego on shortest routes is proved to win.
-    seconds : float
-        Wall-clock time taken.
-    limit : int or None
-        Bytes of memory that may be used.
-    """
+    """What synthesis says of an instance."""
 
     solution: Solution
+    """Who wins from which position."""
     instance: Instance
+    """Of which it says so."""
     route_bound: int
+    """Against how many e-agents an ego on shortest routes is proved to win."""
     seconds: float
+    """Wall-clock time taken."""
     limit: int | None = field(repr=False)
+    """Bytes of memory that may be used."""
 
     @cached_property
     def starts(self) -> list[int]:
@@ -168,27 +159,27 @@ class Answer:
             "elsewhere": "from some positions, but not where the instance starts",
             "nowhere": "nowhere",
         }[self.outcome]
-        found = [
-            f"{_e_agents(board.others)}, {board.arena.cells} cells, crossings from degree "
-            f"{board.arena.order_degree} on; assumed: {board.assumption}",
+        lines_of_text = [
+            f"{_e_agents(board.others)}, {board.road_cells.cells} cells, crossings from degree "
+            f"{board.road_cells.order_degree} on; assumed: {board.assumption}",
             f"{game.positions:,} positions, {game.moves:,} moves of the environment",
             f"The ego wins {where}.",
         ]
         if self.realizable == VACUOUSLY:
-            found.append(
+            lines_of_text.append(
                 "It wins vacuously: each of these wins rests on an assumption that can't be kept then."
             )
         vacuous = int(self.solution.vacuous.sum())
         if vacuous:
-            found.append(
+            lines_of_text.append(
                 f"Warning: in {vacuous:,} positions it wins only by bringing the e-agents to where they can't keep "
                 "their assumption. The strategy never does so, and gives these positions up."
             )
         if self.route_bound > 0:
-            found.append(
+            lines_of_text.append(
                 f"On shortest routes it is proved to win against up to {_e_agents(self.route_bound)}."
             )
-        return found
+        return lines_of_text
 
     def explain(self, progress: Progress | None = None) -> list[str]:
         """Return why the ego wins, or how it is stopped and what to assume so that it is not.
@@ -218,18 +209,18 @@ class Answer:
 
     def _waits(self, target: int, ranks: Ranks) -> str:
         """Return in how many positions on the way to a target the ego gets on by itself or waits, and for what."""
-        arena = self.solution.game.board.arena
+        road_cells = self.solution.game.board.road_cells
         held = ranks.rank > 0
         debt = ranks.debt[ranks.rank[held]]
-        nodes = len(arena.nodes)
+        nodes = len(road_cells.nodes)
         parts = {
             "gets nearer whatever the others do": debt < 0,
-            "waits until one enters (E3, E5)": (debt >= nodes) & (debt < arena.cells),
+            "waits until one enters (E3, E5)": (debt >= nodes) & (debt < road_cells.cells),
             "waits until one leaves (E4)": (debt >= 0) & (debt < nodes),
-            "waits until the goal is freed (E6)": debt >= arena.cells,
+            "waits until the goal is freed (E6)": debt >= road_cells.cells,
         }
         shares = ", ".join(f"{what} in {int(some.sum()):,}" for what, some in parts.items() if some.any())
-        return f"On the way to {arena.target_name(target)} it {shares} positions."
+        return f"On the way to {road_cells.target_name(target)} it {shares} positions."
 
 
 def _e_agents(count: int) -> str:
@@ -254,8 +245,6 @@ def answer(
 
     Parameters
     ----------
-    instance : Instance
-        Roads, goals, starts and e-agents.
     cars : int, optional
         E-agents; those of the instance, if not given.
     assumption : Assumption, optional
@@ -268,13 +257,13 @@ def answer(
     Raises
     ------
     InputError
-        As `game.build` and `Arena.of`.
+        As `game.build` and `RoadCells.of`.
     """
     begun = perf_counter()
-    arena = arena_of(instance.problem, order_degree)
+    road_cells = cells_of(instance.problem, order_degree)
     others = len(instance.e_agents) if cars is None else cars
-    board = Board(arena, assumption_of(instance.problem) if assumption is None else assumption, others)
-    bound = route_bound(arena, board.assumption)
+    board = Board(road_cells, assumption_of(instance.problem) if assumption is None else assumption, others)
+    bound = route_bound(road_cells, board.assumption)
     try:
         game = build(board, limit=limit, progress=progress)
     except InputError as error:

@@ -60,8 +60,6 @@ class Archive:
 
     Parameters
     ----------
-    path : str or Path
-        The file.
     what : str
         What it should be, for messages.
 
@@ -125,10 +123,10 @@ class Archive:
             raise InputError(
                 "too large", field=name, value=f"{member.file_size} bytes", expected=f"at most {room}"
             )
-        found = self._read(lambda: self._array(member, name, kind, most))
-        if exactly and len(found) != most:
-            raise InputError("of another size", field=name, value=len(found), expected=f"{most} numbers")
-        return found
+        numbers = self._read(lambda: self._array(member, name, kind, most))
+        if exactly and len(numbers) != most:
+            raise InputError("of another size", field=name, value=len(numbers), expected=f"{most} numbers")
+        return numbers
 
     def _array(
         self, member: zipfile.ZipInfo, name: str, kind: type[np.generic], most: int

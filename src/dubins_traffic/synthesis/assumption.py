@@ -54,33 +54,22 @@ class Arriving(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Assumption:
-    """What is assumed of the e-agents; as it stands, all of E1 to E6, as the rules have them.
-
-    Attributes
-    ----------
-    order : Order
-        E1.
-    yields : bool
-        E2: no e-agent moves into the cell of the ego.
-    enters : bool
-        E3: who is first at a clear intersection enters at last.
-    forfeits : Forfeits
-        Whether places in the order may be given up.
-    leaves : Leaving
-        E4: who is in an intersection with a free exit leaves at last.
-    arrives : Arriving
-        E5: who is in a lane comes to its end at last, and so into the order, or through a bend.
-    frees : bool
-        E6: every goal is free again and again.
-    """
+    """What is assumed of the e-agents; as it stands, all of E1 to E6, as the rules have them."""
 
     order: Order = Order.KEPT
+    """E1."""
     yields: bool = True
+    """E2: no e-agent moves into the cell of the ego."""
     enters: bool = True
+    """E3: who is first at a clear intersection enters at last."""
     forfeits: Forfeits = Forfeits.NEVER
+    """Whether places in the order may be given up."""
     leaves: Leaving = Leaving.OWED
+    """E4: who is in an intersection with a free exit leaves at last."""
     arrives: Arriving = Arriving.OWED
+    """E5: who is in a lane comes to its end at last, and so into the order, or through a bend."""
     frees: bool = True
+    """E6: every goal is free again and again."""
 
     @classmethod
     def parse(cls, words: Iterable[str]) -> Assumption:
@@ -88,7 +77,7 @@ class Assumption:
 
         InputError if a word is none of ours or a part is named twice.
         """
-        found = NOTHING
+        assumption = NOTHING
         seen: set[str] = set()
         for word in words:
             name = _NAMES.get(word.strip().lower())
@@ -98,8 +87,8 @@ class Assumption:
             if part in seen:
                 raise InputError("assumed twice", field="--assume", value=part, expected="each part once")
             seen.add(part)
-            found = replace(found, **WORDS[name])
-        return found
+            assumption = replace(assumption, **WORDS[name])
+        return assumption
 
     def words(self) -> tuple[str, ...]:
         """Return the words that `parse` understands as this assumption."""

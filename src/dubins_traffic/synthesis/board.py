@@ -16,16 +16,16 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import Rows, record, table
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Assumption, Forfeits, Leaving
-from dubins_traffic.synthesis.queues import IMPOSSIBLE, SLOTS, WHO, Kind, Scene, Scenery, scenery
+from dubins_traffic.synthesis.queues import IMPOSSIBLE, SLOTS, WHO, NodeKind, Scene, Scenery, scenery
+from dubins_traffic.synthesis.road_cells import RoadCells
 
 MOST_OTHERS: Final = 62
 """E-agents of the largest game; their moves are bits of a number."""
 
 
 @record
-class Settings:
+class BoardNumbers:
     """What the whole game depends on."""
 
     others: int
@@ -46,7 +46,7 @@ class Settings:
     """1 if only the ego, in the way out, excuses who does not enter (E5)."""
 
 
-class Tables(NamedTuple):
+class BoardTables(NamedTuple):
     """What the kernels are given: V nodes, L lanes, the scenes of all kinds one after another.
 
     Attributes
@@ -115,33 +115,28 @@ class Tables(NamedTuple):
     goal_nodes: Ints
     crossing: Ints
     opposite: Ints
-    settings: Rows[Settings]
+    settings: Rows[BoardNumbers]
 
 
 @dataclass(frozen=True)
 class Board:
-    """All positions of the ego and a number of e-agents on an arena.
+    """All positions of the ego and a number of e-agents on the cells of a road network."""
 
-    Attributes
-    ----------
-    arena : Arena
-        The cells.
-    assumption : Assumption
-        What decides which positions there are, beside the cells.
-    others : int
-        E-agents, at most `MOST_OTHERS`.
-    """
-
-    arena: Arena
+    road_cells: RoadCells
+    """The cells."""
     assumption: Assumption
+    """What decides which positions there are, beside the cells."""
     others: int
+    """E-agents, at most `MOST_OTHERS`."""
 
     @cached_property
-    def _kinds(self) -> list[Kind]:
-        return [Kind.of(len(node.inbound), node.crossing, self.assumption) for node in self.arena.nodes]
+    def _kinds(self) -> list[NodeKind]:
+        return [
+            NodeKind.of(len(node.inbound), node.crossing, self.assumption) for node in self.road_cells.nodes
+        ]
 
     @cached_property
-    def sceneries(self) -> dict[Kind, Scenery]:
+    def sceneries(self) -> dict[NodeKind, Scenery]:
         """The scenes of each kind of node."""
         return {kind: scenery(kind, self.others) for kind in dict.fromkeys(self._kinds)}
 
@@ -181,7 +176,7 @@ class Board:
         return self._completions[0][self.others][1]
 
     def _offsets(self, node: int) -> Ints:
-        """Return [e-agents left, ego left, scene] of `Tables.offset` for a node."""
+        """Return [e-agents left, ego left, scene] of `BoardTables.offset` for a node."""
         after = self._completions[node + 1]
         rows = np.zeros((self.others + 1, 2, len(self.scenery(node).scenes)), dtype=np.int64)
         for left in range(self.others + 1):
@@ -196,23 +191,23 @@ class Board:
         return rows
 
     @cached_property
-    def tables(self) -> Tables:
+    def tables(self) -> BoardTables:
         """What the kernels are given."""
-        nodes = self.arena.nodes
-        begin: dict[Kind, int] = {}
+        nodes = self.road_cells.nodes
+        begin: dict[NodeKind, int] = {}
         for kind in self.sceneries:
             begin[kind] = sum(len(self.sceneries[earlier].scenes) for earlier in begin)
         offsets = [self._offsets(n).ravel() for n in range(len(nodes))]
-        ends = np.array(self.arena.lane_end, dtype=np.int64).reshape(-1, 2)
+        ends = np.array(self.road_cells.lane_end, dtype=np.int64).reshape(-1, 2)
         exits = [list(node.exits) for node in nodes]
-        return Tables(
+        return BoardTables(
             base=_ints(begin[kind] for kind in self._kinds),
             scene_count=_ints(len(self.sceneries[kind].scenes) for kind in self._kinds),
             offset_at=_starts(len(part) for part in offsets),
             offset=np.concatenate(offsets),
             inbound=_padded([list(node.inbound) for node in nodes]),
-            exit_at=_starts(len(own) for own in exits),
-            exits=_ints(lane for own in exits for lane in own),
+            exit_at=_starts(len(lanes) for lanes in exits),
+            exits=_ints(lane for lanes in exits for lane in lanes),
             lane_node=ends[:, 0].copy(),
             lane_slot=ends[:, 1].copy(),
             **self._changes(),
@@ -222,37 +217,39 @@ class Board:
                 WHO.RENEWED if kind.forfeits is Forfeits.ONCE else WHO.OTHER for kind in self._kinds
             ),
             goal=_ints(self._goal_of(node.vertex) for node in nodes),
-            goal_nodes=_ints(len(own) for own in self.arena.goal_nodes),
+            goal_nodes=_ints(len(nodes_of_goal) for nodes_of_goal in self.road_cells.goal_nodes),
             crossing=_ints(node.crossing for node in nodes),
-            opposite=_ints(self.arena.opposite(n) for n in range(len(nodes))),
+            opposite=_ints(self.road_cells.opposite(n) for n in range(len(nodes))),
             settings=self._settings(),
         )
 
-    def _settings(self) -> Rows[Settings]:
-        """Return `Tables.settings`."""
-        found, own = table(Settings, 1), self.assumption
-        row = found[0]
-        row.others, row.positions, row.cells = self.others, self.positions, self.arena.cells
-        row.yields, row.frees = own.yields, own.frees
-        row.leaves, row.unmet = own.leaves is not Leaving.NEVER, own.leaves is Leaving.UNMET
-        row.moves_up = own.arrives is Arriving.MOVES_UP
-        return found
+    def _settings(self) -> Rows[BoardNumbers]:
+        """Return `BoardTables.settings`."""
+        settings, assumption = table(BoardNumbers, 1), self.assumption
+        row = settings[0]
+        row.others, row.positions, row.cells = self.others, self.positions, self.road_cells.cells
+        row.yields, row.frees = assumption.yields, assumption.frees
+        row.leaves, row.unmet = assumption.leaves is not Leaving.NEVER, assumption.leaves is Leaving.UNMET
+        row.moves_up = assumption.arrives is Arriving.MOVES_UP
+        return settings
 
     def _changes(self) -> dict[str, Ints]:
         """Return the tables of the scenes of all kinds, padded to four slots."""
-        found: dict[str, list[Ints]] = {}
-        for own in self.sceneries.values():
-            pad = SLOTS - own.kind.slots
-            described = own.described() | {"left": own.left(), "ego_entered": own.ego_entered()}
+        tables_of_kinds: dict[str, list[Ints]] = {}
+        for of_kind in self.sceneries.values():
+            pad = SLOTS - of_kind.kind.slots
+            described = of_kind.described() | {"left": of_kind.left(), "ego_entered": of_kind.ego_entered()}
             for name, row in described.items():
-                found.setdefault(name, []).append(row)
-            for name, changed in (("entered", own.entered()), ("removed", own.removed())):
-                found.setdefault(name, []).append(_wider(changed, ((0, 0), (0, pad))))
-            found.setdefault("arrived", []).append(_wider(own.arrived(), ((0, 0), (0, pad), (0, 0))))
-        return {name: np.concatenate(parts) for name, parts in found.items()}
+                tables_of_kinds.setdefault(name, []).append(row)
+            for name, changed in (("entered", of_kind.entered()), ("removed", of_kind.removed())):
+                tables_of_kinds.setdefault(name, []).append(_wider(changed, ((0, 0), (0, pad))))
+            tables_of_kinds.setdefault("arrived", []).append(
+                _wider(of_kind.arrived(), ((0, 0), (0, pad), (0, 0)))
+            )
+        return {name: np.concatenate(parts) for name, parts in tables_of_kinds.items()}
 
     def _goal_of(self, vertex: int) -> int:
-        return self.arena.goals.index(vertex) if vertex in self.arena.goals else -1
+        return self.road_cells.goals.index(vertex) if vertex in self.road_cells.goals else -1
 
     def number(self, scenes: Sequence[Scene]) -> int:
         """Return the number of the position with these scenes, one a node.
@@ -274,16 +271,16 @@ class Board:
     def scenes(self, position: int) -> list[Scene]:
         """Return the scene of every node in a position."""
         left, ego, rest = self.others, 1, position
-        found: list[Scene] = []
-        for n in range(len(self.arena.nodes)):
-            own = self.scenery(n).scenes
-            start = int(self.tables.offset_at[n]) + (left * 2 + ego) * len(own)
-            row = self.tables.offset[start : start + len(own)]
+        scenes_of_nodes: list[Scene] = []
+        for n in range(len(self.road_cells.nodes)):
+            at_node = self.scenery(n).scenes
+            start = int(self.tables.offset_at[n]) + (left * 2 + ego) * len(at_node)
+            row = self.tables.offset[start : start + len(at_node)]
             number = int(np.searchsorted(row, rest, side="right")) - 1
             rest -= int(row[number])
-            found.append(own[number])
-            left, ego = left - own[number].others, ego - own[number].egos
-        return found
+            scenes_of_nodes.append(at_node[number])
+            left, ego = left - at_node[number].others, ego - at_node[number].egos
+        return scenes_of_nodes
 
 
 def _ints(values: Iterable[int]) -> Ints:

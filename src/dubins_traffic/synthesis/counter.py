@@ -14,11 +14,11 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Arriving, Leaving
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.positions import Flags, Numbers
 from dubins_traffic.synthesis.queues import WHO
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.routes import distances
 from dubins_traffic.synthesis.solver import Solution
 
@@ -28,15 +28,10 @@ NEVER = np.int64(2**62)
 
 @dataclass
 class Counterstrategy:
-    """How the environment wins a game where the ego does not.
-
-    Parameters
-    ----------
-    solution : Solution
-        Who wins.
-    """
+    """How the environment wins a game where the ego does not."""
 
     solution: Solution
+    """Who wins."""
     _safe: dict[int, Flags] = field(default_factory=dict[int, Flags], repr=False)
     _turns: dict[tuple[int, int], Ints] = field(default_factory=dict[tuple[int, int], Ints], repr=False)
 
@@ -73,7 +68,7 @@ class Counterstrategy:
             return int(moves[0]), debt
         turns = self._until(level, debt)
         answers = [self._answers(move) for move in moves.tolist()]
-        worst = np.array([max((turns[after] for after in own), default=0) for own in answers])
+        worst = np.array([max((turns[after] for after in answer), default=0) for answer in answers])
         return int(moves[np.argmin(worst)]), debt
 
     def _moves(self, position: int) -> Ints:
@@ -131,8 +126,8 @@ class Counterstrategy:
         ends: list[Numbers] = []
         for turns in self.solution.game.turns():
             low, high = np.searchsorted(positions, (turns.first, turns.first + len(turns.at) - 1))
-            own = positions[low:high] - turns.first
-            row, edge = _edges(turns.at, own)
+            places = positions[low:high] - turns.first
+            row, edge = _edges(turns.at, places)
             good = safe[turns.to[edge]]
             rows.append(row[good] + low)
             ends.append(turns.to[edge[good]])
@@ -162,21 +157,14 @@ EGO_CAR = 0
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What stands where when the environment is to move.
-
-    Attributes
-    ----------
-    cells : tuple of int
-        Of each car, the ego's first.
-    orders : dict
-        For each node the lanes in which somebody waits in the order, first first.
-    rammed : bool
-        Whether an e-agent has driven into the ego.
-    """
+    """What stands where when the environment is to move."""
 
     cells: tuple[int, ...]
+    """Of each car, the ego's first."""
     orders: dict[int, tuple[int, ...]]
+    """For each node the lanes in which somebody waits in the order, first first."""
     rammed: bool = False
+    """Whether an e-agent has driven into the ego."""
 
 
 def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> list[str]:
@@ -184,8 +172,6 @@ def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> li
 
     Parameters
     ----------
-    counter : Counterstrategy
-        How it plays.
     position : int
         A lost position; where it begins.
     turns : int
@@ -193,9 +179,9 @@ def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> li
     """
     board = counter.solution.game.board
     moments, again, goal = played(counter, position, turns)
-    arena = board.arena
-    name = ("goal " if goal < len(arena.goals) else "") + arena.target_name(goal)
-    lines = [f"From here the ego can be kept from {name} for ever:", *_scene_lines(arena, moments[0])]
+    road_cells = board.road_cells
+    name = ("goal " if goal < len(road_cells.goals) else "") + road_cells.target_name(goal)
+    lines = [f"From here the ego can be kept from {name} for ever:", *_scene_lines(road_cells, moments[0])]
     if moments[-1].rammed:
         return [
             *lines,
@@ -206,7 +192,7 @@ def story_of(counter: Counterstrategy, position: int, turns: int = 10_000) -> li
         lines.append(f"After {_turns(again)} this repeats every {_turns(len(cycle), 'turn')}:")
     else:
         lines.append(f"This repeats every {_turns(len(cycle), 'turn')}:")
-    lines += [_ego_line(arena, cycle)]
+    lines += [_ego_line(road_cells, cycle)]
     return lines + [_line(board, cycle, car) for car in range(1, board.others + 1)]
 
 
@@ -239,21 +225,21 @@ def played(counter: Counterstrategy, position: int, turns: int) -> tuple[list[Mo
 def _towards(counter: Counterstrategy, position: int, goal: int) -> int:
     """Return the move of an ego that takes the shortest way to a goal, or waits."""
     game = counter.solution.game
-    arena = game.board.arena
-    far = distances(arena, arena.targets[goal])
+    road_cells = game.board.road_cells
+    far = distances(road_cells, road_cells.targets[goal])
     options = game.ego_to[game.ego_at[position] : game.ego_at[position + 1]].tolist()
-    return min(options, key=lambda option: (far.get(int(game.ego_cell[option]), arena.cells), option))
+    return min(options, key=lambda option: (far.get(int(game.ego_cell[option]), road_cells.cells), option))
 
 
 def moment_of(board: Board, position: int) -> Moment:
     """Return what stands where in a position; the e-agents sorted by cell."""
-    arena = board.arena
-    count = len(arena.nodes)
+    road_cells = board.road_cells
+    count = len(road_cells.nodes)
     ego, others = -1, list[int]()
     orders: dict[int, tuple[int, ...]] = {}
     for n, scene in enumerate(board.scenes(position)):
-        lanes = [(count + arena.nodes[n].inbound[slot], who) for slot, who in scene.queue]
-        parked = [(count + arena.nodes[n].inbound[slot], -1) for slot in scene.parked]
+        lanes = [(count + road_cells.nodes[n].inbound[slot], who) for slot, who in scene.queue]
+        parked = [(count + road_cells.nodes[n].inbound[slot], -1) for slot in scene.parked]
         inside = [(n, scene.inside)] if scene.inside is not None else []
         for cell, who in lanes + parked + inside:
             if who == WHO.EGO:
@@ -273,8 +259,8 @@ def followed(board: Board, before: Moment, after: Moment) -> Moment:
     def assign(car: int) -> bool:
         if car == len(before.cells):
             return True
-        own = before.cells[car]
-        for cell in (own, *board.arena.following(own)):
+        cell_before = before.cells[car]
+        for cell in (cell_before, *board.road_cells.following(cell_before)):
             if cell in free:
                 free.remove(cell)
                 chosen.append(cell)
@@ -287,34 +273,38 @@ def followed(board: Board, before: Moment, after: Moment) -> Moment:
     return Moment((after.cells[0], *chosen), after.orders)
 
 
-def _scene_lines(arena: Arena, moment: Moment) -> list[str]:
+def _scene_lines(road_cells: RoadCells, moment: Moment) -> list[str]:
     cars = ["the ego", *(f"e-agent {car}" for car in range(1, len(moment.cells)))]
-    return [f"  {car} at {arena.name(cell)}" for car, cell in zip(cars, moment.cells, strict=True)]
+    return [f"  {car} at {road_cells.name(cell)}" for car, cell in zip(cars, moment.cells, strict=True)]
 
 
-def _ego_line(arena: Arena, cycle: Sequence[Moment]) -> str:
+def _ego_line(road_cells: RoadCells, cycle: Sequence[Moment]) -> str:
     cells = list(dict.fromkeys(moment.cells[EGO_CAR] for moment in cycle))
     if len(cells) == 1:
-        return f"  the ego waits at {arena.name(cells[0])}"
-    return "  the ego goes by " + _names(arena, cells)
+        return f"  the ego waits at {road_cells.name(cells[0])}"
+    return "  the ego goes by " + _names(road_cells, cells)
 
 
 def _line(board: Board, cycle: Sequence[Moment], car: int) -> str:
     """Return what an e-agent does while all repeats, and why it need not do anything else."""
-    arena = board.arena
+    road_cells = board.road_cells
     cells = list(dict.fromkeys(moment.cells[car] for moment in cycle))
     if len(cells) > 1:
-        return f"  e-agent {car} goes by {_names(arena, cells)}"
+        return f"  e-agent {car} goes by {_names(road_cells, cells)}"
     cell = cells[0]
-    why = _excuse_inside(board, cycle, cell) if cell < len(arena.nodes) else _excuse_lane(board, cycle, cell)
-    return f"  e-agent {car} holds {arena.name(cell)}: {why}"
+    why = (
+        _excuse_inside(board, cycle, cell)
+        if cell < len(road_cells.nodes)
+        else _excuse_lane(board, cycle, cell)
+    )
+    return f"  e-agent {car} holds {road_cells.name(cell)}: {why}"
 
 
 def _excuse_inside(board: Board, cycle: Sequence[Moment], cell: int) -> str:
     if board.assumption.leaves is Leaving.NEVER:
         return "E4 is not assumed, so it need not leave"
-    exits = board.arena.following(cell)
-    opposite = board.arena.opposite(cell)
+    exits = board.road_cells.following(cell)
+    opposite = board.road_cells.opposite(cell)
     met = {moment.cells.index(opposite) for moment in cycle if opposite in moment.cells}
     if EGO_CAR in met or (met and board.assumption.leaves is Leaving.UNMET):
         return f"again and again {_cars(met)} {_is(met)} in the same bend"
@@ -326,34 +316,36 @@ def _excuse_inside(board: Board, cycle: Sequence[Moment], cell: int) -> str:
 
 
 def _excuse_lane(board: Board, cycle: Sequence[Moment], cell: int) -> str:
-    arena = board.arena
-    node = arena.lane_end[cell - len(arena.nodes)][0]
-    crossing = arena.nodes[node].crossing
+    road_cells = board.road_cells
+    node = road_cells.lane_end[cell - len(road_cells.nodes)][0]
+    crossing = road_cells.nodes[node].crossing
     if all(cell not in moment.orders.get(node, ()) for moment in cycle):
         return "E5 is not assumed, so it need not come to the end of the lane"
     if not (board.assumption.enters if crossing else board.assumption.arrives is not Arriving.NEVER):
-        return f"{'E3' if crossing else 'E5'} is not assumed, so it need not enter {arena.name(node)}"
+        return f"{'E3' if crossing else 'E5'} is not assumed, so it need not enter {road_cells.name(node)}"
     inside = {moment.cells.index(node) for moment in cycle if node in moment.cells}
     ahead = {moment.cells.index(other) for moment in cycle for other in _ahead(moment, node, cell)}
     if board.scenery(node).kind.ordered and ahead:
         return f"again and again {_cars(ahead)} {_is(ahead)} before it in the order"
     if inside:
-        return f"again and again {_cars(inside)} {_is(inside)} in {arena.name(node)}"
+        return f"again and again {_cars(inside)} {_is(inside)} in {road_cells.name(node)}"
     excuse = "" if crossing else _excuse_bend(board, cycle, node)
     return excuse or "it gives up its place in the order again and again"
 
 
 def _excuse_bend(board: Board, cycle: Sequence[Moment], node: int) -> str:
     """Return who excuses a car that waits before a bend or dead end, though that is clear; nothing if nobody does."""
-    opposite = board.arena.opposite(node)
+    opposite = board.road_cells.opposite(node)
     met = {moment.cells.index(opposite) for moment in cycle if opposite in moment.cells}
     if EGO_CAR in met:
         return "again and again the ego is in the bend before it"
-    exits = board.arena.following(node)
+    exits = board.road_cells.following(node)
     closing = {moment.cells.index(lane) for moment in cycle for lane in exits if lane in moment.cells}
     alone = board.assumption.arrives is Arriving.MOVES_UP
     if EGO_CAR in closing or (closing and not alone):
-        return f"again and again {_cars(closing)} {_is(closing)} in the way out of {board.arena.name(node)}"
+        return (
+            f"again and again {_cars(closing)} {_is(closing)} in the way out of {board.road_cells.name(node)}"
+        )
     if met and not alone and board.assumption.leaves is Leaving.UNMET:
         return f"again and again {_cars(met)} {_is(met)} in the bend before it"
     return ""
@@ -373,5 +365,5 @@ def _cars(cars: set[int]) -> str:
     return " and ".join(names) if len(names) < 3 else ", ".join(names[:-1]) + " and " + names[-1]
 
 
-def _names(arena: Arena, cells: Sequence[int]) -> str:
-    return ", ".join(arena.name(cell) for cell in cells)
+def _names(road_cells: RoadCells, cells: Sequence[int]) -> str:
+    return ", ".join(road_cells.name(cell) for cell in cells)

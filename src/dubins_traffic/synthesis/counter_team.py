@@ -26,7 +26,7 @@ from dubins_traffic.synthesis.assumption import Assumption, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy, Moment, followed, moment_of, story_of
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.instance import arena_of, assumption_of
+from dubins_traffic.synthesis.instance import assumption_of, cells_of
 from dubins_traffic.synthesis.queues import Scene
 from dubins_traffic.synthesis.road_play import RoadPlay, Sight, Sighting
 from dubins_traffic.synthesis.solver import solve
@@ -76,7 +76,7 @@ class CounterTeam:
         self._radius, self._reach = problem.intersection_radius, problem.car.body.reach
         self._line = rules.approach_distance + BEFORE_LINE
         self._period = problem.period
-        board = Board(arena_of(problem), _assumed(instance), len(instance.e_agents))
+        board = Board(cells_of(problem), _assumed(instance), len(instance.e_agents))
         self._board = board
         self._strategy = Counterstrategy(solve(build(board)))
         sight = Sight(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
@@ -140,28 +140,28 @@ class CounterTeam:
     def _jump(self, cars: Sequence[Sighting]) -> None:
         """Let the cars that are sent into an intersection enter it when it is clear, whatever the order of arrival."""
         for car in cars[1:]:
-            enters = 0 <= self._targets[car.car] < len(self._board.arena.nodes)
+            enters = 0 <= self._targets[car.car] < len(self._board.road_cells.nodes)
             clear = car.propositions.bits & FLAG.CLEAR != 0
             self._drivers.car[0, car.car].violations = VIOLATION.ROLLING if enters and clear else 0
 
     def _send(self, car: Sighting) -> None:
         """Let the law take a car to its target."""
-        arena, cells = self._board.arena, self._play.cells
-        nodes = len(arena.nodes)
+        road_cells, cells = self._board.road_cells, self._play.cells
+        nodes = len(road_cells.nodes)
         target, own = self._targets[car.car], cells[car.car]
         own_car = self._drivers.car[0, car.car]
         prices = self._drivers.distance[car.car]
         if target < nodes and own >= nodes:
-            free = [lane for lane in arena.nodes[target].exits if nodes + lane not in cells]
-            liked = free or list(arena.nodes[target].exits)
+            free = [lane for lane in road_cells.nodes[target].exits if nodes + lane not in cells]
+            liked = free or list(road_cells.nodes[target].exits)
         elif target >= nodes and own < nodes and not self._is_turning(car, own):
             liked = [target - nodes]
         else:
             return
         prices[:] = NOT_LIKED
         prices[liked] = 0.0
-        v = arena.nodes[target if target < nodes else own].vertex
-        if own_car.lane >= 0 and arena.network.lane_ends(int(own_car.lane))[1] == v:
+        v = road_cells.nodes[target if target < nodes else own].vertex
+        if own_car.lane >= 0 and road_cells.network.lane_ends(int(own_car.lane))[1] == v:
             own_car.next_lane = liked[0]
 
     def _is_turning(self, car: Sighting, node: int) -> bool:
@@ -169,20 +169,20 @@ class CounterTeam:
         return self._distance(car, node) < COMMITTED * self._radius
 
     def _distance(self, car: Sighting, node: int) -> float:
-        x, y = self._points[self._board.arena.nodes[node].vertex]
+        x, y = self._points[self._board.road_cells.nodes[node].vertex]
         return hypot(x - car.pose.x, y - car.pose.y)
 
     def _hold(self, car: Sighting, command: Floats) -> None:
         """Make a car stand: in its disc, before the disc ahead, or farther back if it is to have no place."""
-        arena, cell = self._board.arena, self._play.cells[car.car]
-        nodes = len(arena.nodes)
+        road_cells, cell = self._board.road_cells, self._play.cells[car.car]
+        nodes = len(road_cells.nodes)
         if cell < nodes:
-            if car.propositions.at == arena.nodes[cell].vertex and not self._is_turning(car, cell):
+            if car.propositions.at == road_cells.nodes[cell].vertex and not self._is_turning(car, cell):
                 command[:] = 0.0
             return
         if car.propositions.crosses >= 0 or car.propositions.lane != cell - nodes:
             return
-        node, slot = arena.lane_end[cell - nodes]
+        node, slot = road_cells.lane_end[cell - nodes]
         edge = self._radius + self._reach + (self._line if slot in self._scenes[node].parked else MARGIN)
         room = max(0.0, self._distance(car, node) - edge)
         if command[0] * self._period > room:
@@ -191,11 +191,12 @@ class CounterTeam:
 
 def _times(board: Board, rules: RuleParameters) -> list[float]:
     """Return the time that the rules allow for each debt, seconds: of nodes, then lanes, then goals."""
-    arena = board.arena
+    road_cells = board.road_cells
     lanes = [
-        rules.enter_time if arena.nodes[node].crossing else rules.rest_time for node, _ in arena.lane_end
+        rules.enter_time if road_cells.nodes[node].crossing else rules.rest_time
+        for node, _ in road_cells.lane_end
     ]
-    return [*[rules.exit_time] * len(arena.nodes), *lanes, *[rules.goal_time] * len(arena.goals)]
+    return [*[rules.exit_time] * len(road_cells.nodes), *lanes, *[rules.goal_time] * len(road_cells.goals)]
 
 
 def _assumed(instance: Instance) -> Assumption:

@@ -22,7 +22,7 @@ import numpy as np
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.kernels.records import Rows, record, table
-from dubins_traffic.synthesis.board import Tables
+from dubins_traffic.synthesis.board import BoardTables
 from dubins_traffic.synthesis.moves import environment
 from dubins_traffic.synthesis.positions import Bytes, Cells, Flags, Masks, Moves, Numbers, Work, unrank
 
@@ -60,7 +60,7 @@ class Graph(NamedTuple):
     """
 
     lean: bool
-    tables: Tables
+    tables: BoardTables
     work: Work
     out: Moves
     to_at: Ints
@@ -76,7 +76,7 @@ class Graph(NamedTuple):
     owner: Numbers
 
 
-class Search(NamedTuple):
+class GoalSearch(NamedTuple):
     """What is known on the way to one goal: N positions, O debts of D kinds.
 
     Attributes
@@ -126,7 +126,7 @@ class Search(NamedTuple):
     control: Rows[Control]
 
     @classmethod
-    def of(cls, positions: int, debts: int, kinds: int) -> Search:
+    def of(cls, positions: int, debts: int, kinds: int) -> GoalSearch:
         """Return room for a game of that size, nothing known yet."""
 
         def numbers(count: int, value: int) -> Numbers:
@@ -178,7 +178,7 @@ def reverse(at: Ints, to: Numbers, back_at: Ints, back: Numbers) -> None:
 
 
 @jit_long
-def own(owed_at: Ints, owner: Numbers) -> None:
+def assign_owners(owed_at: Ints, owner: Numbers) -> None:
     """Set `owner` (O,) to the position of each debt; those of position p begin at entry p of `owed_at` (N+1,)."""
     for position in range(owed_at.shape[0] - 1):
         for o in range(owed_at[position], owed_at[position + 1]):
@@ -197,8 +197,8 @@ def _turns(g: Graph, position: int) -> tuple[int, int]:
 
 
 @jit_long
-def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
-    """Set `found` (N,) to Cpre of `safe` (N,); `ready` (N+1,) is room."""
+def forced(g: Graph, safe: Flags, ready: Bytes, result: Flags) -> None:
+    """Set `result` (N,) to Cpre of `safe` (N,); `ready` (N+1,) is room."""
     count = safe.shape[0]
     ready[count] = 0
     for position in range(count):
@@ -208,16 +208,16 @@ def forced(g: Graph, safe: Flags, ready: Bytes, found: Flags) -> None:
                 ready[position] = 1
                 break
     for position in range(count):
-        found[position] = True
+        result[position] = True
         first, last = _turns(g, position)
         for e in range(first, last):
             if ready[g.to[e]] == 0:
-                found[position] = False
+                result[position] = False
                 break
 
 
 @jit
-def _watch(g: Graph, s: Search, position: int) -> bool:
+def _watch(g: Graph, s: GoalSearch, position: int) -> bool:
     """Let a position watch its next move that is not ready; true if there is none."""
     first, last = _turns(g, position)
     for e in range(first + s.seen[position], last):
@@ -232,7 +232,7 @@ def _watch(g: Graph, s: Search, position: int) -> bool:
 
 
 @jit
-def _watch_owed(g: Graph, s: Search, o: int) -> None:
+def _watch_owed(g: Graph, s: GoalSearch, o: int) -> None:
     """Let a debt watch the next of its ends that is not ready; if there is none it becomes a candidate."""
     position = g.owner[o]
     first, last = _turns(g, position)
@@ -248,7 +248,7 @@ def _watch_owed(g: Graph, s: Search, o: int) -> None:
 
 
 @jit
-def _rank(s: Search, position: int, rank: int) -> None:
+def _rank(s: GoalSearch, position: int, rank: int) -> None:
     """Take a position into Y."""
     control = s.control[0]
     s.rank[position] = rank
@@ -258,7 +258,7 @@ def _rank(s: Search, position: int, rank: int) -> None:
 
 
 @jit
-def _attract(g: Graph, s: Search) -> None:
+def _attract(g: Graph, s: GoalSearch) -> None:
     """Take into Y, again and again, what is in Cpre(Y)."""
     control = s.control[0]
     while control.taken < control.queued and control.stopped == 0:
@@ -278,7 +278,7 @@ def _attract(g: Graph, s: Search) -> None:
 
 
 @jit
-def _make_ready(g: Graph, s: Search, to: int, following: int) -> None:
+def _make_ready(g: Graph, s: GoalSearch, to: int, following: int) -> None:
     """The ego can get into Y from `to`: tell all who watch it."""
     if s.ready[to]:
         return
@@ -298,7 +298,7 @@ def _make_ready(g: Graph, s: Search, to: int, following: int) -> None:
 
 
 @jit
-def _stays(g: Graph, s: Search, position: int) -> bool:
+def _stays(g: Graph, s: GoalSearch, position: int) -> bool:
     """Say whether the ego can get from a position into Y or the marked ones, whatever the environment does."""
     first, last = _turns(g, position)
     for e in range(first + s.seen[position], last):
@@ -307,18 +307,18 @@ def _stays(g: Graph, s: Search, position: int) -> bool:
             continue
         if to >= s.mark.shape[0]:
             return False
-        found = False
+        stays = False
         for k in range(g.ego_at[to], g.ego_at[to + 1]):
             if s.mark[g.ego_to[k]]:
-                found = True
+                stays = True
                 break
-        if not found:
+        if not stays:
             return False
     return True
 
 
 @jit
-def _gather(g: Graph, s: Search, kind: int) -> int:
+def _gather(g: Graph, s: GoalSearch, kind: int) -> int:
     """Mark and list the candidates of a kind that are not in Y yet; return how many."""
     count = 0
     kept = NOBODY
@@ -338,7 +338,7 @@ def _gather(g: Graph, s: Search, kind: int) -> int:
 
 
 @jit
-def _shrink(g: Graph, s: Search, count: int) -> int:
+def _shrink(g: Graph, s: GoalSearch, count: int) -> int:
     """Unmark members until the ego can stay among those left; return how many are left, first in `members`."""
     before = count + 1
     while count < before:
@@ -355,7 +355,7 @@ def _shrink(g: Graph, s: Search, count: int) -> int:
 
 
 @jit
-def _settle(s: Search, kind: int, count: int, layered: bool) -> bool:
+def _settle(s: GoalSearch, kind: int, count: int, layered: bool) -> bool:
     """Take the members into Y as one layer, ranked by their depth if `layered`; say whether there are any."""
     control = s.control[0]
     first = control.next_rank
@@ -375,13 +375,13 @@ def _settle(s: Search, kind: int, count: int, layered: bool) -> bool:
 
 
 @jit
-def _wait(g: Graph, s: Search, kind: int) -> bool:
+def _wait(g: Graph, s: GoalSearch, kind: int) -> bool:
     """Take into Y where the ego can wait until the environment pays a debt; say whether there is any such place."""
     return _settle(s, kind, _shrink(g, s, _gather(g, s, kind)), False)
 
 
 @jit
-def _wait_friendly(g: Graph, s: Search, kind: int) -> bool:
+def _wait_friendly(g: Graph, s: GoalSearch, kind: int) -> bool:
     """Do as `_wait`, but only where the environment can pay: some of its moves, answered by the ego, lead into Y.
 
     Who needs more moves gets a higher rank, so that the ego, which seeks low ranks, does answer so.
@@ -398,7 +398,7 @@ def _wait_friendly(g: Graph, s: Search, kind: int) -> bool:
 
 
 @jit
-def _possible(g: Graph, s: Search, count: int) -> int:
+def _possible(g: Graph, s: GoalSearch, count: int) -> int:
     """Keep the members from which the environment has a way into Y, sorted by its length; return how many."""
     for k in range(count):
         s.depth[s.members[k]] = 0
@@ -421,7 +421,7 @@ def _possible(g: Graph, s: Search, count: int) -> int:
 
 
 @jit
-def _one_nearer(g: Graph, s: Search, position: int, depth: int) -> bool:
+def _one_nearer(g: Graph, s: GoalSearch, position: int, depth: int) -> bool:
     """Say whether some move of the environment, answered by the ego, leads into Y or to a member of less depth."""
     first, last = _turns(g, position)
     for e in range(first, last):
@@ -438,7 +438,7 @@ def _one_nearer(g: Graph, s: Search, position: int, depth: int) -> bool:
 
 
 @jit_long
-def reach(g: Graph, target: Flags, cells: int, friendly: bool, s: Search) -> None:
+def reach(g: Graph, target: Flags, cells: int, friendly: bool, s: GoalSearch) -> None:
     """Rank all positions from which the ego can reach a target.
 
     Parameters
@@ -451,7 +451,7 @@ def reach(g: Graph, target: Flags, cells: int, friendly: bool, s: Search) -> Non
         Debts below that number are ended by a move of one car.
     friendly : bool
         Whether the ego waits for a goal to be freed only where the environment can free it.
-    s : Search
+    s : GoalSearch
         Fresh room; the result.
     """
     for position in range(target.shape[0]):

@@ -43,24 +43,16 @@ WORKERS: Final = min(2, os.cpu_count() or 1)
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """How large a game will be.
-
-    Attributes
-    ----------
-    positions : int
-        Exact.
-    moves : int
-        Of the environment, about.
-    bytes : int
-        Memory at the peak, about.
-    lean_bytes : int
-        The same for a lean game.
-    """
+    """How large a game will be."""
 
     positions: int
+    """Exact."""
     moves: int
+    """Of the environment, about."""
     bytes: int
+    """Memory at the peak, about."""
     lean_bytes: int
+    """The same for a lean game."""
 
 
 class Turns(NamedTuple):
@@ -80,46 +72,35 @@ class Game:
 
     Position N is none: it stands for the ego having been rammed. A *lean* game does not keep the moves of the
     environment, most of what a game consists of; they are worked out anew each time.
-
-    Attributes
-    ----------
-    board : Board
-        What the numbers of positions mean.
-    moves, most_moves : int
-        E, and the most from one position.
-    to_at : (N+1,) int64
-        Where the moves of the environment from each position begin in `to`. This and the next two are empty in a
-        lean game.
-    to : (E,) int32
-        The positions to which they lead; there the ego moves.
-    moved : (E,) uint8 or int64
-        Which of the e-agents that may move entered or left a node, as bits.
-    ego_at : (N+1,) int64
-        Where the moves of the ego from each position begin in `ego_to`.
-    ego_to : (F,) int32
-        The positions to which they lead; there the environment moves.
-    owed_at : (N+1,) int64
-        Where the debts of each position begin.
-    owed : (O,) int16
-        A cell: the assumption that whoever is there goes on some time. Number of cells + k: that goal k is freed.
-    owed_mask : (O,) uint8 or int64
-        The bits of `moved` that end the debt; others may.
-    ego_cell : (N,) int16
-        Cell of the ego.
     """
 
     board: Board
+    """What the numbers of positions mean."""
     moves: int
     most_moves: int
+    """`moves`, `most_moves`: e, and the most from one position."""
     to_at: Ints
+    """Shape (N+1,). Where the moves of the environment from each position begin in `to`. This and the next two are
+    empty in a lean game.
+    """
     to: Numbers
+    """Shape (E,). The positions to which they lead; there the ego moves."""
     moved: Masks
+    """Shape (E,). Which of the e-agents that may move entered or left a node, as bits."""
     ego_at: Ints
+    """Shape (N+1,). Where the moves of the ego from each position begin in `ego_to`."""
     ego_to: Numbers
+    """Shape (F,). The positions to which they lead; there the environment moves."""
     owed_at: Ints
+    """Shape (N+1,). Where the debts of each position begin."""
     owed: Cells
+    """Shape (O,). A cell: the assumption that whoever is there goes on some time. Number of cells + k: that goal k
+    is freed.
+    """
     owed_mask: Masks
+    """Shape (O,). The bits of `moved` that end the debt; others may."""
     ego_cell: Cells
+    """Shape (N,). Cell of the ego."""
 
     @property
     def positions(self) -> int:
@@ -134,11 +115,11 @@ class Game:
     @property
     def debts(self) -> int:
         """How many kinds of debts there may be: one a cell and one a goal."""
-        return self.board.arena.cells + len(self.board.arena.goals)
+        return self.board.road_cells.cells + len(self.board.road_cells.goals)
 
     def at_target(self, target: int) -> Flags:
-        """Return where (N,) the ego is at one of `Arena.targets`."""
-        return np.isin(self.ego_cell, np.array(self.board.arena.targets[target], dtype=np.int16))
+        """Return where (N,) the ego is at one of `RoadCells.targets`."""
+        return np.isin(self.ego_cell, np.array(self.board.road_cells.targets[target], dtype=np.int16))
 
     def turns(self) -> Iterator[Turns]:
         """Yield the moves of the environment from all positions, in order, some positions at a time."""
@@ -181,7 +162,7 @@ def estimate(board: Board) -> Estimate:
     count = board.positions
     if count == 0:
         raise InputError(
-            "more cars than cells", value=board.others + 1, expected=f"at most {board.arena.cells}"
+            "more cars than cells", value=board.others + 1, expected=f"at most {board.road_cells.cells}"
         )
     if count >= MOST_POSITIONS:
         raise InputError(
@@ -195,7 +176,7 @@ def estimate(board: Board) -> Estimate:
         used = out.used[0]
         sizes += (used.to, used.ego_to, used.owed)
     moves, ego_moves, debts = (count * sizes / len(picked)).tolist()
-    goals = len(board.arena.targets)
+    goals = len(board.road_cells.targets)
     mask = np.dtype(mask_type(board.others)).itemsize
     building = 2 * (4 * ego_moves + (2 + mask) * debts) + 26 * count
     solving = 8 * ego_moves + (6 + mask) * debts + 26 * count
@@ -213,15 +194,9 @@ def build(
 
     Parameters
     ----------
-    board : Board
-        The positions.
     limit : int, optional
         Bytes of memory that may be used; half of what the machine has, if not given. A game that would take more is
         built lean.
-    progress : callable, optional
-        Told about it now and then.
-    workers : int
-        Threads.
 
     Raises
     ------
@@ -304,7 +279,7 @@ def _block(board: Board, first: int, last: int, each: int) -> list[Moves]:
 def room(board: Board, rows: int, each: int) -> Moves:
     """Return room for the moves of `rows` positions, about `each` of the environment from one."""
     margin = 64
-    turns, debts = rows * each + margin, 2 * rows * board.others + margin + len(board.arena.goals)
+    turns, debts = rows * each + margin, 2 * rows * board.others + margin + len(board.road_cells.goals)
     masks = mask_type(board.others)
     return Moves(
         np.empty(turns, dtype=np.int32),
@@ -361,35 +336,35 @@ WHO_NAMES: Final = ("e-agent", "ego", "e-agent that has forfeited")
 
 def scene_numbers(board: Board) -> Numbers:
     """Return the scene (N, V) of each node in each position, numbered as in the header."""
-    found = np.empty((board.positions, len(board.arena.nodes)), dtype=np.int32)
-    room = np.empty(len(board.arena.nodes), dtype=np.int64)
-    list_scenes(board.tables, room, found)
-    return found
+    numbers = np.empty((board.positions, len(board.road_cells.nodes)), dtype=np.int32)
+    room = np.empty(len(board.road_cells.nodes), dtype=np.int64)
+    list_scenes(board.tables, room, numbers)
+    return numbers
 
 
 def header(board: Board) -> dict[str, Any]:
     """Return what the numbers in the file mean."""
-    arena = board.arena
+    road_cells = board.road_cells
     kinds = list(board.sceneries)
     return {
         "format": FORMAT,
         "version": VERSION,
-        "network": arena.network.to_document(),
-        "goals": [list(arena.network.intersections[goal]) for goal in arena.goals],
-        "order_degree": arena.order_degree,
+        "network": road_cells.network.to_document(),
+        "goals": [list(road_cells.network.intersections[goal]) for goal in road_cells.goals],
+        "order_degree": road_cells.order_degree,
         "cars": board.others,
         "assume": list(board.assumption.words()),
-        "cells": [arena.name(cell) for cell in range(arena.cells)],
+        "cells": [road_cells.name(cell) for cell in range(road_cells.cells)],
         "nodes": [
             {
-                "inbound": [len(arena.nodes) + lane for lane in node.inbound],
-                "exits": [len(arena.nodes) + lane for lane in node.exits],
+                "inbound": [len(road_cells.nodes) + lane for lane in node.inbound],
+                "exits": [len(road_cells.nodes) + lane for lane in node.exits],
                 "kind": kinds.index(board.scenery(n).kind),
             }
-            for n, node in enumerate(arena.nodes)
+            for n, node in enumerate(road_cells.nodes)
         ],
-        "goal_nodes": [list(nodes) for nodes in arena.goal_nodes],
-        "targets": [list(nodes) for nodes in arena.targets],
+        "goal_nodes": [list(nodes) for nodes in road_cells.goal_nodes],
+        "targets": [list(nodes) for nodes in road_cells.targets],
         "kinds": [
             [
                 {

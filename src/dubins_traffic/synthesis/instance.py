@@ -12,32 +12,30 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.queues import WHO, Scene
+from dubins_traffic.synthesis.road_cells import RoadCells
 
 PARTS = ("E1", "E2", "E3", "E4", "E5", "E6")
 
 
-def arena_of(problem: Problem, order_degree: int | None = None) -> Arena:
+def cells_of(problem: Problem, order_degree: int | None = None) -> RoadCells:
     """Return the cells of a problem.
 
     Parameters
     ----------
-    problem : Problem
-        Roads and goals.
     order_degree : int, optional
         Least degree of a crossing; that of the problem's rules, if not given.
 
     Raises
     ------
     InputError
-        As `Arena.of`.
+        As `RoadCells.of`.
     """
     rules = RuleParameters.from_mapping(problem.rules)
     degree = rules.crossing_degree if order_degree is None else order_degree
-    return Arena.of(problem.network, problem.goal_vertices, degree)
+    return RoadCells.of(problem.network, problem.goal_vertices, degree)
 
 
 def assumption_of(problem: Problem) -> Assumption:
@@ -53,10 +51,10 @@ def start_positions(board: Board, instance: Instance) -> list[int]:
     """
     if len(instance.starts) != board.others + 1:
         return []
-    cells = [cell_of(board.arena, instance.problem, pose) for pose in instance.starts]
+    cells = [cell_of(board.road_cells, instance.problem, pose) for pose in instance.starts]
     if len(set(cells)) < len(cells):
         return []
-    choices = [list(_scenes(board, node, cells)) for node in range(len(board.arena.nodes))]
+    choices = [list(_scenes(board, node, cells)) for node in range(len(board.road_cells.nodes))]
     return sorted({board.number(scenes) for scenes in product(*choices)})
 
 
@@ -72,46 +70,48 @@ def start_cells(board: Board, instance: Instance) -> list[int]:
             value=len(instance.starts),
             expected=f"{board.others + 1}",
         )
-    cells = [cell_of(board.arena, instance.problem, pose) for pose in instance.starts]
+    cells = [cell_of(board.road_cells, instance.problem, pose) for pose in instance.starts]
     for k, cell in enumerate(cells):
         if cell in cells[:k]:
-            name = board.arena.name(cell)
+            name = board.road_cells.name(cell)
             raise InputError(
                 "two cars start in one cell", field="starts", value=name, expected="one car a cell"
             )
     return cells
 
 
-def cell_of(arena: Arena, problem: Problem, pose: Pose) -> int:
+def cell_of(road_cells: RoadCells, problem: Problem, pose: Pose) -> int:
     """Return the cell in which a pose lies: the node whose disc holds the centre, else the lane by heading."""
-    network = arena.network
+    network = road_cells.network
     place = np.array([[pose.x, pose.y]])
     vertices, distances = network.nearest_intersection(place)
     heading = np.array([np.cos(pose.theta), np.sin(pose.theta)])
     if distances.item() < problem.intersection_radius:
-        nodes = arena.nodes_of(int(vertices.item()))
-        return max(nodes, key=lambda n: max(_along(arena, lane, heading) for lane in arena.nodes[n].exits))
+        nodes = road_cells.nodes_of(int(vertices.item()))
+        return max(
+            nodes, key=lambda n: max(_along(road_cells, lane, heading) for lane in road_cells.nodes[n].exits)
+        )
     segment = int(network.nearest_segment(place)[0].item())
     lanes = (2 * segment, 2 * segment + 1)
     gone = {lane: float(network.lane_coordinates(lane, place)[0].item()) for lane in lanes}
-    return len(arena.nodes) + max(lanes, key=lambda lane: _along(arena, lane, heading, gone[lane]))
+    return len(road_cells.nodes) + max(lanes, key=lambda lane: _along(road_cells, lane, heading, gone[lane]))
 
 
-def _along(arena: Arena, lane: int, heading: Floats, gone: float = 0.0) -> float:
+def _along(road_cells: RoadCells, lane: int, heading: Floats, gone: float = 0.0) -> float:
     """Return how far one gets along a lane by a step of the heading, `gone` metres from where it begins."""
-    _, way = arena.network.lane_places(lane, np.array([gone]))
+    _, way = road_cells.network.lane_places(lane, np.array([gone]))
     return float(heading @ way[0])
 
 
 def _scenes(board: Board, node: int, cells: list[int]) -> Iterator[Scene]:
     """Yield the scenes that a node may have with the cars in these cells, the ego's first."""
-    arena = board.arena
+    road_cells = board.road_cells
     kind = board.scenery(node).kind
     inside = (WHO.EGO if cells[0] == node else WHO.OTHER) if node in cells else None
     waiting = [
-        (slot, WHO.EGO if cells[0] == len(arena.nodes) + lane else WHO.OTHER)
-        for slot, lane in enumerate(arena.nodes[node].inbound)
-        if len(arena.nodes) + lane in cells
+        (slot, WHO.EGO if cells[0] == len(road_cells.nodes) + lane else WHO.OTHER)
+        for slot, lane in enumerate(road_cells.nodes[node].inbound)
+        if len(road_cells.nodes) + lane in cells
     ]
     parked: tuple[int, ...] = ()
     if kind.parks:

@@ -14,19 +14,19 @@ from typing import Final, NamedTuple
 
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
-from dubins_traffic.synthesis.board import Tables
+from dubins_traffic.synthesis.board import BoardTables
 from dubins_traffic.synthesis.positions import MOST_CHOICES, Moves, Work, rank, unrank
 from dubins_traffic.synthesis.queues import IMPOSSIBLE, SLOTS, WHO
 
 
 @jit
-def _inside(t: Tables, work: Work, node: int) -> int:
+def _inside(t: BoardTables, work: Work, node: int) -> int:
     """Return who is in a node: 0 nobody or no such node, 1 an e-agent, 2 the ego."""
     return int(t.inside[t.base[node] + work.scenes[node]]) if node >= 0 else 0
 
 
 @jit
-def _in_lane(t: Tables, work: Work, lane: int) -> int:
+def _in_lane(t: BoardTables, work: Work, lane: int) -> int:
     """Return who is in a lane: 0 nobody, 1 an e-agent, 2 the ego."""
     end = t.base[t.lane_node[lane]] + work.scenes[t.lane_node[lane]]
     if (t.taken[end] >> t.lane_slot[lane] & 1) == 0:
@@ -35,7 +35,7 @@ def _in_lane(t: Tables, work: Work, lane: int) -> int:
 
 
 @jit
-def _ways_out(t: Tables, work: Work, node: int) -> tuple[bool, int]:
+def _ways_out(t: BoardTables, work: Work, node: int) -> tuple[bool, int]:
     """Say whether an exit of a node is free; and whether the ego is in one (2), in the lane beside one (1) or not (0).
 
     Away from crossings the way back is no exit. In a node of several exits nobody knows who came by which, so there
@@ -56,7 +56,7 @@ def _ways_out(t: Tables, work: Work, node: int) -> tuple[bool, int]:
 
 
 @jit
-def _may_pass(t: Tables, work: Work, node: int) -> bool:
+def _may_pass(t: BoardTables, work: Work, node: int) -> bool:
     """E5: say whether who waits before a bend or dead end that is clear has no excuse to wait there."""
     free, ego = _ways_out(t, work, node)
     opposite = _inside(t, work, t.opposite[node])
@@ -68,7 +68,7 @@ def _may_pass(t: Tables, work: Work, node: int) -> bool:
 
 
 @jit
-def _may_leave(t: Tables, work: Work, node: int) -> bool:
+def _may_leave(t: BoardTables, work: Work, node: int) -> bool:
     """E4: say whether who is in a node has no excuse to stay there."""
     free, _ = _ways_out(t, work, node)
     opposite = _inside(t, work, t.opposite[node])
@@ -76,22 +76,22 @@ def _may_leave(t: Tables, work: Work, node: int) -> bool:
 
 
 @jit
-def _to_free(t: Tables, work: Work, goal: int) -> int:
+def _to_free(t: BoardTables, work: Work, goal: int) -> int:
     """E6: return a node of a goal that an e-agent is in, or -1 if there is none or the ego keeps the goal closed."""
-    found = -1
+    node_to_free = -1
     free = False
     ego = False
     for v in range(t.base.shape[0]):
         if t.goal[v] == goal and _inside(t, work, v) == 1:
-            found = v
+            node_to_free = v
             out, near = _ways_out(t, work, v)
             free = free or out
             ego = ego or near > 0 or _inside(t, work, t.opposite[v]) == WHO.EGO + 1
-    return -1 if ego and not free else found
+    return -1 if ego and not free else node_to_free
 
 
 @jit
-def owe(t: Tables, work: Work, out: Moves) -> bool:
+def owe(t: BoardTables, work: Work, out: Moves) -> bool:
     """Write what the environment owes in `work.scenes`; false if there is no room."""
     used = out.used[0].owed
     if used + 2 * t.settings[0].others + t.goal_nodes.shape[0] > out.owed.shape[0]:
@@ -143,7 +143,7 @@ INSIDE = -1
 
 
 @jit
-def _units(t: Tables, work: Work) -> None:
+def _units(t: BoardTables, work: Work) -> None:
     """List the e-agents that may move and their choices; note whether one may ram the ego."""
     count = 0
     work.total[0].rammed = 0
@@ -199,7 +199,7 @@ def _next_choice(work: Work) -> bool:
 
 
 @jit
-def _depart(t: Tables, work: Work) -> int:
+def _depart(t: BoardTables, work: Work) -> int:
     """Take all that move from their cells and list who arrives; return the bits of `Moves.moved`, or -1."""
     moved = 0
     arrivals = 0
@@ -244,7 +244,7 @@ def _arrival(work: Work, arrivals: int, node: int, slot: int, who: int) -> int:
 
 
 @jit
-def _arrive(t: Tables, work: Work) -> bool:
+def _arrive(t: BoardTables, work: Work) -> bool:
     """Let all arrive in the order of `turn`; false if a lane is taken."""
     for v in range(t.base.shape[0]):
         work.arrived_scenes[v] = work.moved_scenes[v]
@@ -281,8 +281,8 @@ def _permute(turn: Ints, low: int, high: int) -> bool:
     pivot = high - 2
     while pivot >= low and turn[pivot] > turn[pivot + 1]:
         pivot -= 1
-    found = pivot >= low
-    if found:
+    has_next = pivot >= low
+    if has_next:
         other = high - 1
         while turn[other] < turn[pivot]:
             other -= 1
@@ -293,11 +293,11 @@ def _permute(turn: Ints, low: int, high: int) -> bool:
         turn[left], turn[right] = turn[right], turn[left]
         left += 1
         right -= 1
-    return found
+    return has_next
 
 
 @jit
-def environment(t: Tables, work: Work, out: Moves) -> bool:
+def environment(t: BoardTables, work: Work, out: Moves) -> bool:
     """Write the moves of the environment from `work.scenes`; false if there is no room.
 
     The number of positions stands for one in which the ego has been rammed.
@@ -331,7 +331,7 @@ def environment(t: Tables, work: Work, out: Moves) -> bool:
 
 
 @jit
-def _ego(t: Tables, position: int, work: Work, out: Moves) -> int:
+def _ego(t: BoardTables, position: int, work: Work, out: Moves) -> int:
     """Write the moves of the ego from `work.scenes`; return its cell, or -1 if there is no room."""
     used = out.used[0].ego_to
     if used + MOST_CHOICES > out.ego_to.shape[0]:
@@ -357,9 +357,9 @@ def _ego(t: Tables, position: int, work: Work, out: Moves) -> int:
                     used += 1
                     work.scenes[to] = before
         else:
-            own = t.taken[scene] & ~t.others_slots[scene]
+            places = t.taken[scene] & ~t.others_slots[scene]
             for slot in range(SLOTS):
-                if own >> slot & 1:
+                if places >> slot & 1:
                     cell = t.base.shape[0] + t.inbound[v, slot]
             if t.ego_entered[scene] != IMPOSSIBLE:
                 work.scenes[v] = t.ego_entered[scene]
@@ -372,12 +372,12 @@ def _ego(t: Tables, position: int, work: Work, out: Moves) -> int:
 
 
 @jit_long
-def expand(t: Tables, first: int, last: int, work: Work, out: Moves, begun: int) -> int:
+def expand(t: BoardTables, first: int, last: int, work: Work, out: Moves, begun: int) -> int:
     """Write the moves of the positions from `first` to before `last`; return the first that found no room.
 
     Parameters
     ----------
-    t : Tables
+    t : BoardTables
         The board.
     first, last : int
         Numbers of the positions.
@@ -409,7 +409,7 @@ def expand(t: Tables, first: int, last: int, work: Work, out: Moves, begun: int)
 
 
 @jit_long
-def list_moves(t: Tables, position: int, work: Work, out: Moves) -> None:
+def list_moves(t: BoardTables, position: int, work: Work, out: Moves) -> None:
     """Write the moves of both sides from one position, the one as if the environment were to move, the other the ego.
 
     Parameters

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.compile import jit, jit_long
 from dubins_traffic.kernels.records import Rows, record, table
-from dubins_traffic.synthesis.board import Board, Tables
+from dubins_traffic.synthesis.board import Board, BoardTables
 from dubins_traffic.synthesis.queues import SLOTS
 
 Numbers: TypeAlias = npt.NDArray[np.int32]
@@ -85,12 +85,12 @@ class Work(NamedTuple):
     @classmethod
     def of(cls, board: Board) -> Work:
         """Return room for positions of this board."""
-        nodes, cars = len(board.arena.nodes), board.others
+        nodes, cars = len(board.road_cells.nodes), board.others
         shapes = dict.fromkeys(("scenes", "moved_scenes", "arrived_scenes"), (nodes,))
         shapes |= {"choice": (cars, MOST_CHOICES)}
         arrays = cls._fields[:-1]
-        found = {name: np.zeros(shapes.get(name, (cars,)), dtype=np.int64) for name in arrays}
-        return cls(**found, total=table(Totals, 1))
+        arrays_by_name = {name: np.zeros(shapes.get(name, (cars,)), dtype=np.int64) for name in arrays}
+        return cls(**arrays_by_name, total=table(Totals, 1))
 
 
 class Moves(NamedTuple):
@@ -129,7 +129,7 @@ class Moves(NamedTuple):
 
 
 @jit
-def unrank(t: Tables, position: int, scenes: Ints) -> None:
+def unrank(t: BoardTables, position: int, scenes: Ints) -> None:
     """Set `scenes` (V,) to the scene of every node in `position` (number)."""
     left = t.settings[0].others
     ego = 1
@@ -153,7 +153,7 @@ def unrank(t: Tables, position: int, scenes: Ints) -> None:
 
 
 @jit
-def rank(t: Tables, scenes: Ints) -> int:
+def rank(t: BoardTables, scenes: Ints) -> int:
     """Return the number of the position with the scenes `scenes` (V,)."""
     left = t.settings[0].others
     ego = 1
@@ -168,9 +168,9 @@ def rank(t: Tables, scenes: Ints) -> int:
 
 
 @jit_long
-def list_scenes(t: Tables, scenes: Ints, found: Numbers) -> None:
-    """Set `found` (N, V) to the scene of every node in every position; `scenes` (V,) is room."""
-    for position in range(found.shape[0]):
+def list_scenes(t: BoardTables, scenes: Ints, numbers: Numbers) -> None:
+    """Set `numbers` (N, V) to the scene of every node in every position; `scenes` (V,) is room."""
+    for position in range(numbers.shape[0]):
         unrank(t, position, scenes)
         for v in range(scenes.shape[0]):
-            found[position, v] = scenes[v]
+            numbers[position, v] = scenes[v]

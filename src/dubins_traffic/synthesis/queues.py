@@ -38,34 +38,24 @@ IMPOSSIBLE: Final = -1
 
 
 @dataclass(frozen=True, slots=True)
-class Kind:
-    """Nodes whose scenes are the same.
-
-    Attributes
-    ----------
-    slots : int
-        Lanes that end at the node, at most `SLOTS`.
-    ordered : bool
-        Whether there is an order of arrival.
-    jumped : bool
-        Whether e-agents ignore that order.
-    forfeits : Forfeits
-        Whether they may give up their place.
-    parks : bool
-        Whether they may stay away from the end of the lane.
-    owed : bool
-        Whether an e-agent that may enter owes it (E3 at crossings, E5 elsewhere, if the way out allows).
-    """
+class NodeKind:
+    """Nodes whose scenes are the same."""
 
     slots: int
+    """Lanes that end at the node, at most `SLOTS`."""
     ordered: bool
+    """Whether there is an order of arrival."""
     jumped: bool
+    """Whether e-agents ignore that order."""
     forfeits: Forfeits
+    """Whether they may give up their place."""
     parks: bool
+    """Whether they may stay away from the end of the lane."""
     owed: bool
+    """Whether an e-agent that may enter owes it (E3 at crossings, E5 elsewhere, if the way out allows)."""
 
     @classmethod
-    def of(cls, slots: int, crossing: bool, assumed: Assumption) -> Kind:
+    def of(cls, slots: int, crossing: bool, assumed: Assumption) -> NodeKind:
         """Return the kind of a node."""
         ordered = crossing and assumed.order is not Order.NONE
         return cls(
@@ -80,21 +70,14 @@ class Kind:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """Who is at a node.
-
-    Attributes
-    ----------
-    inside : int or None
-        `WHO.OTHER` or `WHO.EGO`.
-    queue : tuple of (slot, who)
-        Who waits, first in order first; without an order, sorted.
-    parked : tuple of int
-        Slots of those that have not come to the end of the lane, sorted.
-    """
+    """Who is at a node."""
 
     inside: int | None = None
+    """`WHO.OTHER` or `WHO.EGO`."""
     queue: tuple[tuple[int, int], ...] = ()
+    """Who waits, first in order first; without an order, sorted."""
     parked: tuple[int, ...] = ()
+    """Slots of those that have not come to the end of the lane, sorted."""
 
     @property
     def taken(self) -> int:
@@ -120,9 +103,9 @@ class Scene:
         )
 
 
-def scenes(kind: Kind, others: int) -> list[Scene]:
+def scenes(kind: NodeKind, others: int) -> list[Scene]:
     """Return all scenes of a kind with at most so many e-agents, the empty one first."""
-    found: list[Scene] = []
+    possible: list[Scene] = []
     whos = (WHO.OTHER, WHO.EGO, WHO.RENEWED) if kind.forfeits is Forfeits.ONCE else (WHO.OTHER, WHO.EGO)
     for count in range(min(kind.slots, others + 1) + 1):
         for taken in (permutations if kind.ordered else combinations)(range(kind.slots), count):
@@ -133,33 +116,27 @@ def scenes(kind: Kind, others: int) -> list[Scene]:
                         for inside in (None, WHO.OTHER, WHO.EGO):
                             scene = Scene(inside, tuple(zip(taken, queue, strict=True)), parked)
                             if scene.egos <= 1 and scene.others <= others:
-                                found.append(scene)
-    return found
+                                possible.append(scene)
+    return possible
 
 
 @dataclass(frozen=True)
 class Scenery:
-    """The scenes of a kind and their changes, by number.
+    """The scenes of a kind and their changes, by number."""
 
-    Attributes
-    ----------
-    kind : Kind
-        The kind.
-    scenes : list of Scene
-        By number.
-    """
-
-    kind: Kind
+    kind: NodeKind
+    """The kind."""
     scenes: list[Scene]
+    """By number."""
 
     @cached_property
     def number(self) -> dict[Scene, int]:
         """The number of each scene."""
         return {scene: number for number, scene in enumerate(self.scenes)}
 
-    def _numbers(self, found: list[Scene | None]) -> Ints:
+    def _numbers(self, changed: list[Scene | None]) -> Ints:
         return np.array(
-            [IMPOSSIBLE if scene is None else self.number.get(scene, IMPOSSIBLE) for scene in found],
+            [IMPOSSIBLE if scene is None else self.number.get(scene, IMPOSSIBLE) for scene in changed],
             dtype=np.int64,
         )
 
@@ -238,13 +215,13 @@ class Scenery:
 
     def ego_entered(self) -> Ints:
         """Return the scene (C,) after the ego has entered from its lane."""
-        found: list[Scene | None] = []
+        entered: list[Scene | None] = []
         for scene in self.scenes:
             places = [place for place, (_, who) in enumerate(scene.queue) if who == WHO.EGO]
             may = scene.inside is None and bool(places) and (places[0] == 0 or not self.kind.ordered)
             slot = scene.queue[places[0]][0] if may else 0
-            found.append(replace(scene.without(slot), inside=WHO.EGO) if may else None)
-        return self._numbers(found)
+            entered.append(replace(scene.without(slot), inside=WHO.EGO) if may else None)
+        return self._numbers(entered)
 
     def arrived(self) -> Ints:
         """Return the scene (C, slots, 4) after each of `WHO` has come into a slot."""
@@ -265,6 +242,6 @@ class Scenery:
         return replace(scene, queue=queue if self.kind.ordered else tuple(sorted(queue)))
 
 
-def scenery(kind: Kind, others: int) -> Scenery:
+def scenery(kind: NodeKind, others: int) -> Scenery:
     """Return the scenes of a kind with at most so many e-agents."""
     return Scenery(kind, scenes(kind, others))

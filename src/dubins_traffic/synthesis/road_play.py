@@ -15,12 +15,12 @@ from typing import Final, NamedTuple
 
 from dubins_traffic.cars.state import Pose, Propositions
 from dubins_traffic.rules.propositions import FLAG, renews_ticket
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Forfeits
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, room
 from dubins_traffic.synthesis.moves import Work, list_moves
 from dubins_traffic.synthesis.queues import WHO, Scene
+from dubins_traffic.synthesis.road_cells import RoadCells
 
 WAITS: Final = FLAG.STOPPED | FLAG.FIRST | FLAG.FORFEITED
 """The flags that say where in the order a car is."""
@@ -36,18 +36,12 @@ class Sighting(NamedTuple):
 
 
 class Ground:
-    """The cells of an arena as places on the road.
+    """The cells of a road network as places on the road."""
 
-    Parameters
-    ----------
-    arena : Arena
-        The cells.
-    """
-
-    def __init__(self, arena: Arena) -> None:
-        network = arena.network
-        self.arena = arena
-        self._nodes = [arena.nodes_of(v) for v in range(len(network.intersections))]
+    def __init__(self, road_cells: RoadCells) -> None:
+        network = road_cells.network
+        self.road_cells = road_cells
+        self._nodes = [road_cells.nodes_of(v) for v in range(len(network.intersections))]
         self._points: list[list[float]] = network.points.tolist()
         self._network = network
         self._tangents = [
@@ -57,9 +51,9 @@ class Ground:
         ]
         self._ends = [network.lane_ends(lane) for lane in range(network.lanes)]
         self._hulls = [self._hull(segment) for segment in range(len(network.segments))]
-        self._beside: list[list[int]] = [[] for _ in range(arena.cells)]
-        for cell in range(arena.cells):
-            for other in arena.following(cell):
+        self._beside: list[list[int]] = [[] for _ in range(road_cells.cells)]
+        for cell in range(road_cells.cells):
+            for other in road_cells.following(cell):
                 self._beside[other].append(cell)
                 self._beside[cell].append(other)
 
@@ -68,19 +62,19 @@ class Ground:
 
         A car is in an intersection while its body meets the disc, else in the lane of its lane state.
         """
-        count = len(self.arena.nodes)
+        count = len(self.road_cells.nodes)
         if seen.crosses < 0:
             return count + seen.lane if seen.lane >= 0 else before
         nodes = self._nodes[seen.crosses]
         if len(nodes) == 1 or before in nodes:
             return nodes[0] if len(nodes) == 1 else before
-        if before >= count and self.arena.lane_end[before - count][0] in nodes:
-            return self.arena.lane_end[before - count][0]
+        if before >= count and self.road_cells.lane_end[before - count][0] in nodes:
+            return self.road_cells.lane_end[before - count][0]
         return max(nodes, key=lambda node: self._fits(node, pose, seen))
 
     def _fits(self, node: int, pose: Pose, seen: Propositions) -> float:
         """Return how well a car that is first seen in a bend belongs into one of its nodes."""
-        here = self.arena.nodes[node]
+        here = self.road_cells.nodes[node]
         if seen.lane >= 0 and (seen.lane in here.inbound or seen.lane in here.exits):
             return 2.0
         tx, ty = self._tangents[here.exits[0]]
@@ -88,7 +82,7 @@ class Ground:
 
     def along(self, cell: int, pose: Pose) -> float:
         """Return how far along its lane a car is, metres; 0 in intersections."""
-        lane = cell - len(self.arena.nodes)
+        lane = cell - len(self.road_cells.nodes)
         if lane < 0:
             return 0.0
         x, y = self._points[self._ends[lane][0]]
@@ -99,7 +93,7 @@ class Ground:
 
     def _hull(self, segment: int) -> list[list[float]]:
         """Return points whose convex hull holds a segment: its ends, and the corners between where it bends."""
-        network = self.arena.network
+        network = self.road_cells.network
         corners = [(x, y) for x, y, _ in network.corners[segment]] if network.corners else []
         ends = [self._points[v] for v in self._ends[2 * segment]]
         return [*ends, *network.to_world(corners).tolist()] if corners else ends
@@ -109,10 +103,10 @@ class Ground:
 
         Its centre is at most `margin` from the intersection, or in the lane between its ends.
         """
-        count = len(self.arena.nodes)
+        count = len(self.road_cells.nodes)
         reach = radius - margin
         points = (
-            [self._points[self.arena.nodes[cell].vertex]]
+            [self._points[self.road_cells.nodes[cell].vertex]]
             if cell < count
             else self._hulls[(cell - count) >> 1]
         )
@@ -124,9 +118,9 @@ class Ground:
         for near in self._by_distance(cell):
             if near in taken:
                 continue
-            if near >= len(self.arena.nodes) and near not in avoided:
+            if near >= len(self.road_cells.nodes) and near not in avoided:
                 return near
-            kind = 0 if near >= len(self.arena.nodes) else 1
+            kind = 0 if near >= len(self.road_cells.nodes) else 1
             spare[kind] = near if spare[kind] == NOWHERE else spare[kind]
         return spare[0] if spare[0] != NOWHERE else spare[1]
 
@@ -151,24 +145,16 @@ NEW_TICKET: Final = "new_ticket"
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """How the road is seen.
-
-    Attributes
-    ----------
-    sight : float
-        The ego sees the cars within this distance, metres.
-    margin : float
-        How far from an intersection a car in its disc may be, metres.
-    look : int
-        Ticks after which it is asked again where unseen cars may be.
-    assume_ego : bool
-        Whether a place is assumed for the ego, too, while it is behind another car in its cell.
-    """
+    """How the road is seen."""
 
     sight: float
+    """The ego sees the cars within this distance, metres."""
     margin: float
+    """How far from an intersection a car in its disc may be, metres."""
     look: int
+    """Ticks after which it is asked again where unseen cars may be."""
     assume_ego: bool = False
+    """Whether a place is assumed for the ego, too, while it is behind another car in its cell."""
 
 
 class MoveList:
@@ -198,12 +184,8 @@ class RoadPlay:
 
     Parameters
     ----------
-    board : Board
-        The game.
     sight : Sight
         How the road is seen.
-    names : sequence of str
-        Of the cars, the ego first.
 
     Attributes
     ----------
@@ -220,7 +202,7 @@ class RoadPlay:
     """
 
     def __init__(self, board: Board, sight: Sight, names: Sequence[str]) -> None:
-        self.ground = Ground(board.arena)
+        self.ground = Ground(board.road_cells)
         self.moves = MoveList(board)
         self.position: int | None = None
         self.cells = [NOWHERE] * (board.others + 1)
@@ -234,14 +216,14 @@ class RoadPlay:
         self._again = 0
         self._shown: dict[int, int] = {}
         self._seen: dict[int, Sighting] = {}
-        self._queues: list[list[int]] = [[] for _ in board.arena.nodes]
+        self._queues: list[list[int]] = [[] for _ in board.road_cells.nodes]
         self._ticket = [NO_TICKET] * (board.others + 1)
         self._bits = [0] * (board.others + 1)
 
     @property
     def at_lanes_end(self) -> bool:
         """Whether the ego holds the end of a lane, so that it has to decide what to do before an intersection."""
-        return self.position is not None and self.cells[EGO_CAR] >= len(self._board.arena.nodes)
+        return self.position is not None and self.cells[EGO_CAR] >= len(self._board.road_cells.nodes)
 
     def follow(self, tick: int, cars: Sequence[Sighting]) -> bool:
         """Take in a frame, the ego first in `cars`; return whether anything has changed."""
@@ -281,17 +263,17 @@ class RoadPlay:
         return shown
 
     def _is_before(self, car: int, other: int, cell: int) -> bool:
-        if cell < len(self._board.arena.nodes):
+        if cell < len(self._board.road_cells.nodes):
             return self._shown.get(car) == cell and self._shown.get(other) != cell
         along = self.ground.along
         return along(cell, self._seen[car].pose) > along(cell, self._seen[other].pose)
 
     def _note_crowds(self, shown: dict[int, int], cells: dict[int, int]) -> None:
         """Note who has gone where somebody is already: only through a bend one may follow another."""
-        arena = self._board.arena
+        road_cells, nodes = self._board.road_cells, self._board.road_cells.nodes
         for car, cell in cells.items():
             entered = car in self._shown and car not in shown and self._shown[car] != cell != NOWHERE
-            if entered and cell < len(arena.nodes) and len(arena.nodes_of(arena.nodes[cell].vertex)) == 1:
+            if entered and cell < len(nodes) and len(road_cells.nodes_of(nodes[cell].vertex)) == 1:
                 self._note_move(car, self._shown[car], cell)
 
     def _assume(self, shown: dict[int, int]) -> None:
@@ -301,10 +283,10 @@ class RoadPlay:
         if EGO_CAR not in shown and not self._sight.assume_ego:
             taken.add(self.cells[EGO_CAR])
         ego = self.cells[EGO_CAR]
-        avoided = set(self._board.arena.following(ego)) if ego != NOWHERE else set[int]()
+        avoided = set(self._board.road_cells.following(ego)) if ego != NOWHERE else set[int]()
         for cell in tuple(avoided):
-            avoided.update(self._board.arena.following(cell))
-        nodes = len(self._board.arena.nodes)
+            avoided.update(self._board.road_cells.following(cell))
+        nodes = len(self._board.road_cells.nodes)
         for car in range(0 if self._sight.assume_ego else 1, len(self.cells)):
             cell = self.cells[car]
             if car in self._shown and (car in shown or cell not in now):
@@ -323,21 +305,21 @@ class RoadPlay:
         start = max(cell, 0)
         if car in self._seen:
             return self.ground.nearest_free(start, taken, avoided)
-        open_to_view = {other for other in range(self._board.arena.cells) if self._would_be_seen(other)}
-        found = self.ground.nearest_free(start, taken | open_to_view, avoided)
-        return found if found != NOWHERE else self.ground.nearest_free(start, taken, avoided)
+        open_to_view = {other for other in range(self._board.road_cells.cells) if self._would_be_seen(other)}
+        free_cell = self.ground.nearest_free(start, taken | open_to_view, avoided)
+        return free_cell if free_cell != NOWHERE else self.ground.nearest_free(start, taken, avoided)
 
     def _put(self, car: int, cell: int) -> None:
         """Move a car, out of the queue it is in and last into the one it comes to."""
-        nodes = len(self._board.arena.nodes)
+        nodes = len(self._board.road_cells.nodes)
         old = self.cells[car]
         if old >= nodes:
-            queue = self._queues[self._board.arena.lane_end[old - nodes][0]]
+            queue = self._queues[self._board.road_cells.lane_end[old - nodes][0]]
             if car in queue:
                 queue.remove(car)
         self.cells[car] = cell
         if cell >= nodes:
-            self._queues[self._board.arena.lane_end[cell - nodes][0]].append(car)
+            self._queues[self._board.road_cells.lane_end[cell - nodes][0]].append(car)
 
     def _play(self, shown: dict[int, int]) -> None:
         """Make the moves of the cars that were shown and are, first those into free cells, of these e-agents first."""
@@ -356,7 +338,7 @@ class RoadPlay:
         self.position = self._number()
         self.checked += 1
         if before is None or self.position is None:
-            known = before is None and cell in self._board.arena.following(old)
+            known = before is None and cell in self._board.road_cells.following(old)
         elif car == EGO_CAR:
             known = self.position in self.moves.of_ego(before)
         else:
@@ -365,8 +347,10 @@ class RoadPlay:
             self._note_move(car, old, cell)
 
     def _note_move(self, car: int, old: int, cell: int) -> None:
-        arena = self._board.arena
-        self.noted.append((UNKNOWN_MOVE, f"{self._names[car]} from {arena.name(old)} to {arena.name(cell)}"))
+        road_cells = self._board.road_cells
+        self.noted.append(
+            (UNKNOWN_MOVE, f"{self._names[car]} from {road_cells.name(old)} to {road_cells.name(cell)}")
+        )
 
     def _show(self, shown: dict[int, int], cells: dict[int, int]) -> None:
         """Put the cars that have come into view, and the ego if it is behind another, where they are."""
@@ -404,36 +388,36 @@ class RoadPlay:
         elif renews_ticket(before, bits):
             self._ticket[car] = tick
             self.noted.append(
-                (NEW_TICKET, f"{self._names[car]} in {self._board.arena.name(self.cells[car])}")
+                (NEW_TICKET, f"{self._names[car]} in {self._board.road_cells.name(self.cells[car])}")
             )
 
     def _number(self) -> int | None:
         """Return the number of the position in which the cars are, None if there is none."""
-        board, arena = self._board, self._board.arena
-        nodes = len(arena.nodes)
+        board, road_cells = self._board, self._board.road_cells
+        nodes = len(road_cells.nodes)
         if NOWHERE in self.cells or len(set(self.cells)) < len(self.cells):
             return None
         inside = {cell: car for car, cell in enumerate(self.cells) if cell < nodes}
         scenes: list[Scene] = []
         for node, queue in enumerate(self._queues):
-            own = inside.get(node)
-            if own is None and not queue:
+            occupant = inside.get(node)
+            if occupant is None and not queue:
                 scenes.append(EMPTY)
                 continue
-            scenes.append(self._scene(node, own, queue))
+            scenes.append(self._scene(node, occupant, queue))
         try:
             return board.number(scenes)
         except KeyError:
             return None
 
     def _scene(self, node: int, inside: int | None, queue: Sequence[int]) -> Scene:
-        arena = self._board.arena
+        road_cells = self._board.road_cells
         kind = self._board.scenery(node).kind
-        nodes = len(arena.nodes)
+        nodes = len(road_cells.nodes)
         parked: list[int] = []
         waiting: list[tuple[int, int]] = []
         for car in queue:
-            slot = arena.lane_end[self.cells[car] - nodes][1]
+            slot = road_cells.lane_end[self.cells[car] - nodes][1]
             if kind.parks and car != EGO_CAR and self._ticket[car] == NO_TICKET:
                 parked.append(slot)
                 continue

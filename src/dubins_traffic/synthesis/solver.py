@@ -13,7 +13,15 @@ from typing import Final
 
 import numpy as np
 
-from dubins_traffic.synthesis.fixpoint import UNRANKED, Graph, Search, forced, own, reach, reverse
+from dubins_traffic.synthesis.fixpoint import (
+    UNRANKED,
+    GoalSearch,
+    Graph,
+    assign_owners,
+    forced,
+    reach,
+    reverse,
+)
 from dubins_traffic.synthesis.game import WORKERS, Game, Progress, room
 from dubins_traffic.synthesis.positions import Cells, Flags, Numbers, Work
 
@@ -23,21 +31,18 @@ LOOK: Final = 0.1
 
 @dataclass(frozen=True)
 class Ranks:
-    """How to get to one goal: move to the position of lowest rank, and wait while the environment owes.
-
-    Attributes
-    ----------
-    rank : (N,) int32
-        0 at the goal, -1 where the ego does not get there.
-    start : (R,) int32
-        First rank of the layer of each rank. In a layer the ego waits; otherwise it gets to lower ranks in each turn.
-    debt : (R,) int16
-        What the environment owes in a layer (`game.Game.owed`), or -1 where it can't keep the ego in the layer.
-    """
+    """How to get to one goal: move to the position of lowest rank, and wait while the environment owes."""
 
     rank: Numbers
+    """Shape (N,). 0 at the goal, -1 where the ego does not get there."""
     start: Numbers
+    """Shape (R,). First rank of the layer of each rank. In a layer the ego waits; otherwise it gets to lower ranks
+    in each turn.
+    """
     debt: Cells
+    """Shape (R,). What the environment owes in a layer (`game.Game.owed`), or -1 where it can't keep the ego in the
+    layer.
+    """
 
 
 @dataclass(frozen=True)
@@ -50,46 +55,30 @@ class _Ranked:
 
 @dataclass(frozen=True)
 class Loss:
-    """Positions that are lost for one goal, once those lost before are avoided.
-
-    Attributes
-    ----------
-    goal : int
-        The goal that the environment can keep from the ego.
-    target : (N,) bool
-        Where the goal would have counted as reached.
-    lost : (N,) bool
-        The positions.
-    """
+    """Positions that are lost for one goal, once those lost before are avoided."""
 
     goal: int
+    """The goal that the environment can keep from the ego."""
     target: Flags
+    """Shape (N,). Where the goal would have counted as reached."""
     lost: Flags
+    """Shape (N,). The positions."""
 
 
 @dataclass(frozen=True)
 class Solution:
-    """Who wins a game.
-
-    Attributes
-    ----------
-    game : Game
-        The game.
-    winning : (N,) bool
-        Where the ego wins.
-    vacuous : (N,) bool
-        Where it wins, but only by bringing the environment to where it can't keep its assumption.
-    ranks : tuple of Ranks
-        The strategy, one table a goal, for all winning positions that are not vacuous; it never does so.
-    losses : tuple of Loss
-        Why the others are lost, in order; none is lost twice.
-    """
+    """Who wins a game."""
 
     game: Game
+    """The game."""
     winning: Flags
+    """Shape (N,). Where the ego wins."""
     vacuous: Flags
+    """Shape (N,). Where it wins, but only by bringing the environment to where it can't keep its assumption."""
     ranks: tuple[Ranks, ...]
+    """The strategy, one table a goal, for all winning positions that are not vacuous; it never does so."""
     losses: tuple[Loss, ...] = field(repr=False)
+    """Why the others are lost, in order; none is lost twice."""
 
     @property
     def everywhere(self) -> bool:
@@ -104,11 +93,11 @@ def graph(game: Game) -> Graph:
     back = np.empty(game.ego_to.shape[0], dtype=np.int32)
     reverse(game.ego_at, game.ego_to, back_at, back)
     owner = np.empty(game.owed.shape[0], dtype=np.int32)
-    own(game.owed_at, owner)
+    assign_owners(game.owed_at, owner)
     out = room(game.board, 0, 0)
     if not game.lean:
         out = out._replace(to=game.to, moved=game.moved)
-    found = Graph(
+    whole = Graph(
         game.lean,
         game.board.tables,
         Work.of(game.board),
@@ -125,7 +114,7 @@ def graph(game: Game) -> Graph:
         game.owed_mask,
         owner,
     )
-    return for_thread(game, found)
+    return for_thread(game, whole)
 
 
 def for_thread(game: Game, shared: Graph) -> Graph:
@@ -141,10 +130,6 @@ def solve(game: Game, *, progress: Progress | None = None, workers: int = WORKER
 
     Parameters
     ----------
-    game : Game
-        The game.
-    progress : callable, optional
-        Told about it now and then.
     workers : int
         Threads; no more than there are goals are used.
     """
@@ -168,16 +153,16 @@ class _Solver:
     def winning(self, *, friendly: bool) -> tuple[Flags, tuple[Ranks, ...], tuple[Loss, ...], bool]:
         """Return the winning positions, the ranks, the losses, and whether being friendly has cost any position."""
         count = self._game.positions
-        goals = range(len(self._game.board.arena.targets))
+        goals = range(len(self._game.board.road_cells.targets))
         won = np.ones(count, dtype=np.bool_)
         ways = [won] * len(goals)
         losses: list[Loss] = []
         spoiled = False
         while True:
             targets = self._targets(won)
-            found = self._searched(targets, friendly)
-            spoiled = spoiled or any(way.unfriendly for way in found)
-            ways = [way.ranks.rank != UNRANKED for way in found]
+            ranked_goals = self._searched(targets, friendly)
+            spoiled = spoiled or any(way.unfriendly for way in ranked_goals)
+            ways = [way.ranks.rank != UNRANKED for way in ranked_goals]
             before = won
             for goal in goals:
                 lost = won & ~ways[goal]
@@ -185,11 +170,11 @@ class _Solver:
                     losses.append(Loss(goal, targets[goal], lost))
                 won = won & ways[goal]
             if won.sum() in (before.sum(), 0):
-                return won, tuple(_within(way.ranks, won) for way in found), tuple(losses), spoiled
+                return won, tuple(_within(way.ranks, won) for way in ranked_goals), tuple(losses), spoiled
 
     def _targets(self, won: Flags) -> list[Flags]:
         """Return, for each goal, where it has been reached and the ego stays where it has won."""
-        targets = [self._game.at_target(goal) for goal in range(len(self._game.board.arena.targets))]
+        targets = [self._game.at_target(goal) for goal in range(len(self._game.board.road_cells.targets))]
         if won.all():
             return targets
         kept = np.empty(won.shape, dtype=np.bool_)
@@ -201,18 +186,18 @@ class _Solver:
         """Return the ways to all goals: side by side, or for the sake of memory one after the other."""
         if not self._game.lean:
             return self._side_by_side(targets, friendly, "solve")
-        found: list[_Ranked] = []
+        ranked: list[_Ranked] = []
         for k, target in enumerate(targets):
-            found += self._side_by_side([target], friendly, f"solve, goal {k + 1} of {len(targets)}")
-        return found
+            ranked += self._side_by_side([target], friendly, f"solve, goal {k + 1} of {len(targets)}")
+        return ranked
 
     def _side_by_side(self, targets: list[Flags], friendly: bool, what: str) -> list[_Ranked]:
         """Return the ways to these targets; interrupted by Ctrl-C."""
         game = self._game
-        searches = [Search.of(game.positions, game.owed.shape[0], game.debts) for _ in targets]
+        searches = [GoalSearch.of(game.positions, game.owed.shape[0], game.debts) for _ in targets]
         with ThreadPoolExecutor(self._workers) as pool:
             try:
-                cells = game.board.arena.cells
+                cells = game.board.road_cells.cells
                 running = {
                     pool.submit(reach, for_thread(game, self._graph), target, cells, friendly, search)
                     for target, search in zip(targets, searches, strict=True)
@@ -228,13 +213,13 @@ class _Solver:
                 raise
         return [_ranked(search) for search in searches]
 
-    def _tell(self, searches: list[Search], what: str) -> None:
+    def _tell(self, searches: list[GoalSearch], what: str) -> None:
         if self._progress:
             ranked = sum(int(search.control[0].ranked) for search in searches)
             self._progress(what, ranked / (len(searches) * self._game.positions))
 
 
-def _ranked(search: Search) -> _Ranked:
+def _ranked(search: GoalSearch) -> _Ranked:
     """Return what a search has found; its room may go."""
     used = int(search.control[0].next_rank)
     ranks = Ranks(search.rank, search.start[:used].copy(), search.debt[:used].copy())

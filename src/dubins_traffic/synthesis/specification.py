@@ -1,9 +1,10 @@
 """The game of cells as a specification over propositions, for tools that read GR(1) or temporal logic.
 
-The cell of a car is a number, written in bits: ``ego_0``, ``ego_1``, ... for the ego, lowest first, ``car1_0``, ... for
-the first e-agent. Cells are numbered as in `Arena`: nodes, then lanes. ``first_1_2`` says that car 1 is before car 2 in
-the order of one crossing, ``first_0_1`` that the ego is before car 1; false of cars that do not wait for one crossing.
-The environment chooses the cells of the e-agents and the order among them, then the system that of the ego.
+The cell of a car is a number, written in bits: ``ego_0``, ``ego_1``, ... for the ego, lowest first, ``car1_0``, ...
+for the first e-agent. Cells are numbered as in `RoadCells`: nodes, then lanes. ``first_1_2`` says that car 1 is
+before car 2 in the order of one crossing, ``first_0_1`` that the ego is before car 1; false of cars that do not wait
+for one crossing. The environment chooses the cells of the e-agents and the order among them, then the system that of
+the ego.
 """
 
 from __future__ import annotations
@@ -47,10 +48,7 @@ FORMS: Final = {".structuredslugs": "slugs", ".tlsf": "tlsf", ".py": "tulip"}
 def specification_text(board: Board, starts: Sequence[int], ending: str) -> str:
     """Return the game as a specification in the format that an ending of files stands for.
 
-    Raises
-    ------
-    InputError
-        As `specification`, and for another ending.
+    InputError as `specification`, and for another ending.
     """
     if ending not in FORMS:
         expected = f"a name that ends in {', '.join(FORMS)}"
@@ -77,13 +75,13 @@ def order_name(first: int, second: int) -> str:
 def inputs_of(board: Board) -> tuple[str, ...]:
     """Return what the environment chooses: the cells of the e-agents and the order among them."""
     cars = range(1, board.others + 1)
-    bits = [name for car in cars for name in car_bits(car, board.arena.cells)]
+    bits = [name for car in cars for name in car_bits(car, board.road_cells.cells)]
     return (*bits, *(order_name(i, j) for i, j in _pairs(board) if i != EGO))
 
 
 def outputs_of(board: Board) -> tuple[str, ...]:
     """Return what the system chooses: the cell of the ego, and whom it is before."""
-    bits = car_bits(EGO, board.arena.cells)
+    bits = car_bits(EGO, board.road_cells.cells)
     return (*bits, *(order_name(i, j) for i, j in _pairs(board) if i == EGO))
 
 
@@ -98,8 +96,6 @@ def specification(board: Board, starts: Sequence[int]) -> Specification:
 
     Parameters
     ----------
-    board : Board
-        The positions.
     starts : sequence of int
         The cells in which the cars start, the ego first; no two the same.
 
@@ -115,19 +111,19 @@ def specification(board: Board, starts: Sequence[int]) -> Specification:
         "E3": assumed.forfeits is Forfeits.NEVER,
         "E5": assumed.arrives is not Arriving.NEVER,
     }
-    for part, said in wanted.items():
-        if not said:
+    for part, is_sayable in wanted.items():
+        if not is_sayable:
             raise InputError(
                 f"a game without {part}, or with a weaker form, has no specification",
                 field="assume",
                 value=str(assumed),
                 expected="the explicit graph",
             )
-    if any(not node.crossing and len(node.exits) > 1 for node in board.arena.nodes):
+    if any(not node.crossing and len(node.exits) > 1 for node in board.road_cells.nodes):
         raise InputError(
             "roads that meet without being a crossing have no specification",
             field="order_degree",
-            value=board.arena.order_degree,
+            value=board.road_cells.order_degree,
             expected="at most 3, or the explicit graph",
         )
     if board.others > MOST_CARS:
@@ -149,7 +145,7 @@ class _Writer:
 
     @cached_property
     def _nodes(self) -> range:
-        return range(len(self.board.arena.nodes))
+        return range(len(self.board.road_cells.nodes))
 
     @cached_property
     def _cars(self) -> range:
@@ -173,19 +169,19 @@ class _Writer:
         system += [always(part) for part in self._steps_of_ego()]
         system += [
             always(eventually(disj(*(self._at(EGO, node) for node in nodes))))
-            for nodes in self.board.arena.targets
+            for nodes in self.board.road_cells.targets
         ]
         names = inputs_of(self.board), outputs_of(self.board)
         return Specification(_simple(environment), _simple(system), *names)
 
     def _at(self, car: int, cell: int) -> Formula:
-        names = car_bits(car, self.board.arena.cells)
+        names = car_bits(car, self.board.road_cells.cells)
         parts = [prop(name) if cell >> bit & 1 else negation(prop(name)) for bit, name in enumerate(names)]
         return conj(*parts)
 
     def _goes_to(self, car: int, cell: int) -> Formula:
         """Say that a car is in a cell next."""
-        names = car_bits(car, self.board.arena.cells)
+        names = car_bits(car, self.board.road_cells.cells)
         return conj(
             *(
                 next_(prop(name)) if cell >> bit & 1 else negation(next_(prop(name)))
@@ -194,21 +190,25 @@ class _Writer:
         )
 
     def _stays(self, car: int) -> Formula:
-        return conj(*(iff(next_(prop(name)), prop(name)) for name in car_bits(car, self.board.arena.cells)))
+        return conj(
+            *(iff(next_(prop(name)), prop(name)) for name in car_bits(car, self.board.road_cells.cells))
+        )
 
     def _among(self, car: int, cells: Iterable[int], *, later: bool = False) -> Formula:
         where = self._goes_to if later else self._at
         return disj(*(where(car, cell) for cell in cells))
 
     def _inbound(self, node: int) -> list[int]:
-        return [len(self._nodes) + lane for lane in self.board.arena.nodes[node].inbound]
+        return [len(self._nodes) + lane for lane in self.board.road_cells.nodes[node].inbound]
 
     def _exits(self, node: int) -> list[int]:
-        return [len(self._nodes) + lane for lane in self.board.arena.nodes[node].exits]
+        return [len(self._nodes) + lane for lane in self.board.road_cells.nodes[node].exits]
 
     def _crossings(self) -> list[int]:
         """Return the nodes at which several lanes end and an order is kept."""
-        return [v for v in self._nodes if len(self._inbound(v)) > 1 and self.board.arena.nodes[v].crossing]
+        return [
+            v for v in self._nodes if len(self._inbound(v)) > 1 and self.board.road_cells.nodes[v].crossing
+        ]
 
     def _may_wait_together(self, cell: int, other: int) -> bool:
         return any({cell, other} <= set(self._inbound(v)) for v in self._crossings())
@@ -226,9 +226,9 @@ class _Writer:
         )
 
     def _before(self, i: int, j: int, *, later: bool = False) -> Formula:
-        found = prop(order_name(min(i, j), max(i, j)))
-        found = next_(found) if later else found
-        return found if i < j else negation(found)
+        bit = prop(order_name(min(i, j), max(i, j)))
+        bit = next_(bit) if later else bit
+        return bit if i < j else negation(bit)
 
     def _first(self, i: int) -> Formula:
         """Say that nobody waits at the same crossing before a car."""
@@ -243,17 +243,17 @@ class _Writer:
         return disj(*(conj(*(negation(self._at(j, lane)) for j in self._cars)) for lane in self._exits(node)))
 
     def _unmet_by_ego(self, node: int) -> Formula:
-        other = self.board.arena.opposite(node)
+        other = self.board.road_cells.opposite(node)
         return conj() if other < 0 else negation(self._at(EGO, other))
 
     def _steps_of_others(self) -> Iterator[Formula]:
-        cells = self.board.arena.cells
+        cells = self.board.road_cells.cells
         for i in self._cars[1:]:
             moves = [self._stays(i)]
             for v in self._nodes:
                 moves.append(conj(self._at(i, v), self._among(i, self._exits(v), later=True)))
                 waits = self._among(i, self._inbound(v))
-                first = self._first(i) if self.board.arena.nodes[v].crossing else conj()
+                first = self._first(i) if self.board.road_cells.nodes[v].crossing else conj()
                 moves.append(conj(waits, self._clear(v, i), first, self._goes_to(i, v)))
             yield disj(*moves)
             for cell in range(cells):
@@ -286,10 +286,10 @@ class _Writer:
         for v in self._nodes:
             moves.append(conj(self._at(EGO, v), self._among(EGO, self._exits(v), later=True)))
             clear = conj(*(negation(self._goes_to(j, v)) for j in self._cars[1:]))
-            first = self._may_enter() if self.board.arena.nodes[v].crossing else conj()
+            first = self._may_enter() if self.board.road_cells.nodes[v].crossing else conj()
             moves.append(conj(self._among(EGO, self._inbound(v)), clear, first, self._goes_to(EGO, v)))
         yield disj(*moves)
-        for cell in range(self.board.arena.cells):
+        for cell in range(self.board.road_cells.cells):
             others = (self._goes_to(j, cell) for j in self._cars[1:])
             yield implies(self._goes_to(EGO, cell), negation(disj(*others)))
         for i, j in self._pairs:
@@ -316,15 +316,15 @@ class _Writer:
             yield disj(*(self._owes_entry(i, v) for v in self._nodes if self._is_entered(v)))
             if assumed.leaves is not Leaving.NEVER:
                 yield disj(*(conj(self._at(i, v), self._open(v), self._unmet_by_ego(v)) for v in self._nodes))
-        for nodes in self.board.arena.goal_nodes if assumed.frees else ():
+        for nodes in self.board.road_cells.goal_nodes if assumed.frees else ():
             yield conj(self._taken(nodes), negation(self._held_up(nodes)))
 
     def _is_entered(self, node: int) -> bool:
-        return self.board.assumption.enters or not self.board.arena.nodes[node].crossing
+        return self.board.assumption.enters or not self.board.road_cells.nodes[node].crossing
 
     def _owes_entry(self, car: int, node: int) -> Formula:
         owed = [self._among(car, self._inbound(node)), self._clear(node, car), self._unmet_by_ego(node)]
-        if self.board.arena.nodes[node].crossing:
+        if self.board.road_cells.nodes[node].crossing:
             return conj(*owed, self._first(car))
         if self.board.assumption.arrives is Arriving.MOVES_UP:
             return conj(*owed, disj(self._free_exit(node), negation(self._among(EGO, self._exits(node)))))
@@ -332,7 +332,7 @@ class _Writer:
 
     def _open(self, node: int) -> Formula:
         """Say that an exit is free, and where a weak E4 is assumed that no other e-agent passes by."""
-        other = self.board.arena.opposite(node)
+        other = self.board.road_cells.opposite(node)
         if other < 0 or self.board.assumption.leaves is not Leaving.UNMET:
             return self._free_exit(node)
         return conj(self._free_exit(node), self._clear(other, EGO))
@@ -348,11 +348,11 @@ class _Writer:
 
     def _beside(self, node: int) -> list[int]:
         """Return the exits of a node and the lanes beside them."""
-        lanes = (other for lane in self.board.arena.nodes[node].exits for other in (lane, lane ^ 1))
+        lanes = (other for lane in self.board.road_cells.nodes[node].exits for other in (lane, lane ^ 1))
         return [len(self._nodes) + lane for lane in lanes]
 
 
 def _simple(parts: Iterable[Formula]) -> tuple[Formula, ...]:
     """Return parts without constants, and without those that are always true."""
-    found = (simplify(part) for part in parts)
-    return tuple(part for part in found if part.op is not Op.TRUE)
+    simplified = (simplify(part) for part in parts)
+    return tuple(part for part in simplified if part.op is not Op.TRUE)

@@ -24,13 +24,13 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.synthesis.archive import Archive, save_arrays
-from dubins_traffic.synthesis.arena import Arena
 from dubins_traffic.synthesis.assumption import Assumption
 from dubins_traffic.synthesis.board import MOST_OTHERS, Board
 from dubins_traffic.synthesis.fixpoint import NO_DEBT
 from dubins_traffic.synthesis.game import LARGEST_CHOICE, MOST_POSITIONS, Game, room
 from dubins_traffic.synthesis.moves import Work, list_moves
 from dubins_traffic.synthesis.positions import Flags, Numbers
+from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.road_play import EGO_CAR, RoadPlay
 from dubins_traffic.synthesis.solver import Ranks, Solution
 
@@ -40,18 +40,12 @@ VERSION: Final = 2
 
 @dataclass(frozen=True)
 class Strategy:
-    """How the ego wins.
-
-    Attributes
-    ----------
-    board : Board
-        What the numbers of positions mean.
-    ranks : tuple of Ranks
-        One table a goal, in the order of `Arena.goals`.
-    """
+    """How the ego wins."""
 
     board: Board
+    """What the numbers of positions mean."""
     ranks: tuple[Ranks, ...]
+    """One table a goal, in the order of `RoadCells.goals`."""
 
     @classmethod
     def of(cls, solution: Solution) -> Strategy:
@@ -60,11 +54,13 @@ class Strategy:
 
     def wins(self, position: int) -> bool:
         """Say whether the strategy wins from a position in which the environment is to move."""
-        return 0 <= position < self.board.positions and all(own.rank[position] >= 0 for own in self.ranks)
+        return 0 <= position < self.board.positions and all(
+            ranks_of_goal.rank[position] >= 0 for ranks_of_goal in self.ranks
+        )
 
     def first(self) -> int:
         """Return the first position from which the strategy wins; InputError if there is none."""
-        won = np.logical_and.reduce([own.rank >= 0 for own in self.ranks])
+        won = np.logical_and.reduce([ranks_of_goal.rank >= 0 for ranks_of_goal in self.ranks])
         if not won.any():
             raise InputError("a strategy that wins from nowhere", expected="some position")
         return int(np.argmax(won))
@@ -85,20 +81,20 @@ class Strategy:
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the strategy to a file, as `save_arrays` does."""
-        arena = self.board.arena
+        road_cells = self.board.road_cells
         header = {
             "format": FORMAT,
             "version": VERSION,
-            "network": arena.network.to_document(),
-            "goals": [list(arena.network.intersections[goal]) for goal in arena.goals],
-            "order_degree": arena.order_degree,
+            "network": road_cells.network.to_document(),
+            "goals": [list(road_cells.network.intersections[goal]) for goal in road_cells.goals],
+            "order_degree": road_cells.order_degree,
             "cars": self.board.others,
             "assume": list(self.board.assumption.words()),
         }
         arrays: dict[str, Any] = {
-            **{f"rank_{k}": _narrow(own.rank) for k, own in enumerate(self.ranks)},
-            **{f"start_{k}": own.start for k, own in enumerate(self.ranks)},
-            **{f"debt_{k}": own.debt for k, own in enumerate(self.ranks)},
+            **{f"rank_{k}": _narrow(ranks_of_goal.rank) for k, ranks_of_goal in enumerate(self.ranks)},
+            **{f"start_{k}": ranks_of_goal.start for k, ranks_of_goal in enumerate(self.ranks)},
+            **{f"debt_{k}": ranks_of_goal.debt for k, ranks_of_goal in enumerate(self.ranks)},
         }
         save_arrays(path, header, arrays, overwrite=overwrite)
 
@@ -114,11 +110,11 @@ class Strategy:
         """
         with Archive(path, "strategy") as archive:
             try:
-                found = _strategy(archive)
-                found.first()
+                strategy = _strategy(archive)
+                strategy.first()
             except InputError as error:
                 raise error if error.file else error.within(file=str(path)) from None
-        return found
+        return strategy
 
 
 class _Header(BaseModel):
@@ -142,16 +138,16 @@ def _strategy(archive: Archive) -> Strategy:
     header = _header(archive)
     network = RoadNetwork.from_document(header.network)
     goals = [network.vertex((x, y)) for x, y in header.goals]
-    arena = Arena.of(network, goals, header.order_degree)
-    board = Board(arena, Assumption.parse(header.assume), header.cars)
+    road_cells = RoadCells.of(network, goals, header.order_degree)
+    board = Board(road_cells, Assumption.parse(header.assume), header.cars)
     if not 0 < board.positions < MOST_POSITIONS:
         raise InputError("no game", field="header.cars", value=header.cars, expected="one that has positions")
-    return Strategy(board, tuple(_ranks(archive, board, k) for k in range(len(arena.targets))))
+    return Strategy(board, tuple(_ranks(archive, board, k) for k in range(len(road_cells.targets))))
 
 
 def _ranks(archive: Archive, board: Board, target: int) -> Ranks:
     """Return the tables for one target; InputError if they are none of the game."""
-    count, debts = board.positions, board.arena.cells + len(board.arena.goals)
+    count, debts = board.positions, board.road_cells.cells + len(board.road_cells.goals)
     rank = archive.array(f"rank_{target}", np.int32, count, exactly=True)
     start = archive.array(f"start_{target}", np.int32, count + 1)
     debt = archive.array(f"debt_{target}", np.int16, len(start), exactly=True)
@@ -183,21 +179,14 @@ def _header(archive: Archive) -> _Header:
 
 @dataclass(frozen=True, slots=True)
 class Advice:
-    """What to do at the end of a lane.
-
-    Attributes
-    ----------
-    node : int
-        The intersection ahead.
-    enter : bool
-        Whether to enter it as soon as the rules allow, or to wait.
-    exits : tuple of int
-        Lanes out that are free in the game, the best first; empty where the ego may not enter yet.
-    """
+    """What to do at the end of a lane."""
 
     node: int
+    """The intersection ahead."""
     enter: bool
+    """Whether to enter it as soon as the rules allow, or to wait."""
     exits: tuple[int, ...]
+    """Lanes out that are free in the game, the best first; empty where the ego may not enter yet."""
 
 
 class Adviser(Protocol):
@@ -242,33 +231,31 @@ def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Adv
 
     Parameters
     ----------
-    strategy : Strategy
-        The ego's.
     play : RoadPlay
         Where the play is.
     goal, following : int
-        The goal that is sought, and the one to seek after it (places in `Arena.goals`).
+        The goal that is sought, and the one to seek after it (places in `RoadCells.goals`).
     """
     board = strategy.board
-    nodes = len(board.arena.nodes)
+    nodes = len(board.road_cells.nodes)
     position, cell = play.position, play.cells[EGO_CAR]
     if position is None or cell < nodes or not strategy.wins(position):
         return None
-    node = board.arena.lane_end[cell - nodes][0]
+    node = board.road_cells.lane_end[cell - nodes][0]
     options = play.moves.of_ego(position)
     if len(options) == 1:
         return Advice(node, True, ())
     inside = options[1]
-    own = strategy.ranks[goal].rank
-    after = strategy.ranks[following if own[inside] == 0 else goal].rank
+    rank = strategy.ranks[goal].rank
+    after = strategy.ranks[following if rank[inside] == 0 else goal].rank
     free = [
         lane
-        for lane in board.arena.nodes[node].exits
+        for lane in board.road_cells.nodes[node].exits
         if nodes + lane not in play.cells or nodes + lane == cell
     ]
     ways = zip(free, play.moves.of_ego(inside)[1:], strict=True)
     ranked = sorted((int(after[then]), lane) for lane, then in ways if after[then] >= 0)
-    enters = own[inside] >= 0 and (own[position] < 0 or own[inside] <= own[position])
+    enters = rank[inside] >= 0 and (rank[position] < 0 or rank[inside] <= rank[position])
     return Advice(node, bool(enters), tuple(lane for _, lane in ranked))
 
 
@@ -283,25 +270,15 @@ class StrategyError(DubinsTrafficError):
 def check(game: Game, ranks: Sequence[Ranks]) -> None:
     """Check that the ego wins by these ranks from every position that has one.
 
-    Parameters
-    ----------
-    game : Game
-        The game.
-    ranks : sequence of Ranks
-        One table a goal.
-
-    Raises
-    ------
-    StrategyError
-        If it does not: names the first position where a condition above fails.
+    StrategyError if it does not: names the first position where a condition above fails.
     """
-    for goal, own in enumerate(ranks):
+    for goal, ranks_of_goal in enumerate(ranks):
         following = ranks[(goal + 1) % len(ranks)]
-        reached = own.rank == 0
+        reached = ranks_of_goal.rank == 0
         if (reached & ~game.at_target(goal)).any():
             raise _error(game, goal, reached & ~game.at_target(goal), "has rank 0 away from the goal")
-        best = answers(game, own)
-        wrong = _astray(game, own, best)
+        best = answers(game, ranks_of_goal)
+        wrong = _astray(game, ranks_of_goal, best)
         if wrong.any():
             raise _error(game, goal, wrong, "leads to no lower rank while nothing is owed")
         lost = reached & (_worst(game, answers(game, following)) == LOST)
@@ -340,5 +317,5 @@ def _worst(game: Game, best: Numbers) -> Numbers:
 
 def _error(game: Game, goal: int, wrong: Flags, fault: str) -> StrategyError:
     position = int(np.flatnonzero(wrong)[0])
-    name = game.board.arena.target_name(goal)
+    name = game.board.road_cells.target_name(goal)
     return StrategyError(f"position {position}, on the way to {name}: {fault} ({int(wrong.sum())} such)")

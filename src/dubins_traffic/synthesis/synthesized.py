@@ -26,7 +26,7 @@ from dubins_traffic.synthesis.foreign.adviser import MachineAdviser, misfit
 from dubins_traffic.synthesis.foreign.machine import Machine
 from dubins_traffic.synthesis.foreign.read import read_machine
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.instance import arena_of, assumption_of
+from dubins_traffic.synthesis.instance import assumption_of, cells_of
 from dubins_traffic.synthesis.road_play import RoadPlay, Sight, Sighting
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.specification import inputs_of, outputs_of
@@ -54,7 +54,7 @@ class _Pursuit:
     """The goals that the ego seeks, and the play that says what to do.
 
     `ways` (M, L) are the metres from each lane to the goal of each stage, at that goal already to the next; `goals` are
-    the goals of the stages, by their places in the arena, and `vertices` their intersections.
+    the goals of the stages, by their places in `RoadCells`, and `vertices` their intersections.
     """
 
     adviser: Adviser
@@ -107,19 +107,19 @@ class Synthesized(Rules):
         self._period = problem.period
         self._edge = problem.intersection_radius + problem.car.body.reach + MARGIN
         self._patience = (rules.forfeit_time - HURRY) * problem.rate
-        arena = adviser.board.arena
+        road_cells = adviser.board.road_cells
         vertices: list[int] = drivers.stage.tolist()
         self._pursuit = _Pursuit(
             adviser,
             RoadPlay(adviser.board, _sight(problem), ("ego", *problem.e_agents)),
-            _ways(drivers, [arena.network.arms(v) for v in vertices]),
-            [arena.goals.index(v) for v in vertices],
+            _ways(drivers, [road_cells.network.arms(v) for v in vertices]),
+            [road_cells.goals.index(v) for v in vertices],
             vertices,
         )
         ego = drivers.car[0, EGO]
         ego.first, ego.last, ego.place = 0, 1, 0
         self._drivers = drivers.replace(
-            stage=np.array([NO_GOAL]), distance=np.zeros((1, arena.network.lanes))
+            stage=np.array([NO_GOAL]), distance=np.zeros((1, road_cells.network.lanes))
         )
         self._points: list[list[float]] = problem.network.points.tolist()
 
@@ -180,7 +180,7 @@ class Synthesized(Rules):
         if pursuit.advice is None or not pursuit.advice.exits:
             return
         lane = seen.propositions.lane
-        node = pursuit.adviser.board.arena.nodes[pursuit.advice.node]
+        node = pursuit.adviser.board.road_cells.nodes[pursuit.advice.node]
         for place, out in enumerate(_liked(pursuit.advice.exits, node.exits, drivers.distance[0])):
             back = BACK if out == lane ^ 1 and len(node.exits) > 1 else 0.0
             drivers.distance[0, out] = SECOND_BEST * place - back
@@ -208,7 +208,7 @@ class Synthesized(Rules):
             return command
         if drivers.car[0, EGO].turn > self._patience:
             return command
-        x, y = self._points[pursuit.adviser.board.arena.nodes[advice.node].vertex]
+        x, y = self._points[pursuit.adviser.board.road_cells.nodes[advice.node].vertex]
         room = max(0.0, math.hypot(x - seen.pose.x, y - seen.pose.y) - self._edge)
         if command.speed * self._period <= room:
             return command
@@ -252,7 +252,7 @@ def _adviser(strategy: Strategy | Machine | None, problem: Problem, *, fallback:
         return Ranked(_solved(problem))
     if isinstance(strategy, Strategy):
         return Ranked(_fitting(strategy, problem))
-    board = Board(arena_of(problem), assumption_of(problem), len(problem.e_agents))
+    board = Board(cells_of(problem), assumption_of(problem), len(problem.e_agents))
     unfit = misfit(board, strategy)
     if unfit is not None:
         name, how = unfit
@@ -263,13 +263,13 @@ def _adviser(strategy: Strategy | Machine | None, problem: Problem, *, fallback:
 
 def _solved(problem: Problem) -> Strategy:
     """Return the strategy for a problem; if the game is lost it wins nowhere. InputError if the game is too large."""
-    board = Board(arena_of(problem), assumption_of(problem), len(problem.e_agents))
+    board = Board(cells_of(problem), assumption_of(problem), len(problem.e_agents))
     return Strategy.of(solve(build(board)))
 
 
 def _fitting(strategy: Strategy, problem: Problem) -> Strategy:
     """Return `strategy`; InputError if it is for another problem."""
-    own, wanted = strategy.board.arena, arena_of(problem)
+    own, wanted = strategy.board.road_cells, cells_of(problem)
     differences = {
         "network": own.network.to_document() != wanted.network.to_document(),
         "goals": set(own.goals) != set(wanted.goals),

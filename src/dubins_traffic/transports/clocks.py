@@ -72,13 +72,9 @@ class Patience:
 
     `begin`: for the first command after the announcement. `silence`: in real time, without any command. `absence`:
     for a peer that went to come back. `settle`: in lockstep without tags, for further answers to the first frame,
-    which is shown until it is answered. `flood`: commands a second of one car. `at_once`:
-    whether a trial's time begins with its announcement; else it begins with the ego's first command, if that is remote.
-
-    Raises
-    ------
-    InputError
-        If `begin` or `silence` is no positive, finite number.
+    which is shown until it is answered. `flood`: commands a second of one car. `at_once`: whether a trial's time
+    begins with its announcement; else it begins with the ego's first command, if that is remote. InputError if
+    `begin` or `silence` is no positive, finite number.
     """
 
     begin: float = 60.0

@@ -175,13 +175,7 @@ class Inbox:
 
 
 class Punctuality:
-    """Counts late commands and measures answers and frames of one trial.
-
-    Parameters
-    ----------
-    cars : sequence of str
-        Names of the remote cars.
-    """
+    """Counts late commands and measures answers and frames of one trial."""
 
     def __init__(self, cars: Sequence[str]) -> None:
         self.late = dict.fromkeys(cars, 0)

@@ -52,11 +52,11 @@ def message_in(line: bytes) -> dict[str, Any]:
         raise garbage(line) from None
     if type(message) is not dict:
         raise garbage(line)
-    found = cast("dict[str, Any]", message)
+    fields = cast("dict[str, Any]", message)
     for key, end in (("bye", End.GAVE_UP), ("fault", End.CONTROLLER_FAULT)):
-        if type(found.get(key)) is str:
-            raise AnswerError(end, words(found[key]))
-    return found
+        if type(fields.get(key)) is str:
+            raise AnswerError(end, words(fields[key]))
+    return fields
 
 
 def command_of(message: dict[str, Any]) -> Answer | None:
@@ -106,12 +106,12 @@ def _plain(value: object) -> bool:
     return type(value) is float or type(value) is int
 
 
-def _reports(found: Any) -> tuple[tuple[str, str], ...]:
+def _reports(reports: Any) -> tuple[tuple[str, str], ...]:
     """Return kinds and details of events."""
-    if type(found) is not list or len(cast("list[Any]", found)) > MOST_REPORTS:
+    if type(reports) is not list or len(cast("list[Any]", reports)) > MOST_REPORTS:
         raise AnswerError(End.PEER_GARBAGE, "its reports are not a short list")
     pairs: list[tuple[str, str]] = []
-    for each in cast("list[Any]", found):
+    for each in cast("list[Any]", reports):
         match each:
             case [str(kind), str(detail)]:
                 pairs.append((words(kind), words(detail)))

@@ -22,8 +22,6 @@ def drive(address: tuple[str, int], controller: Controller, car: str = "ego") ->
         Host and port of the trial.
     controller : Controller
         Is started with the problem and asked once a tick.
-    car : str
-        Which car to drive.
 
     Raises
     ------

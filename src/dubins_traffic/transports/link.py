@@ -87,7 +87,7 @@ class Link:
         self._remote = [agent.name for agent in instance.e_agents if agent.kind == REMOTE]
         if self.ego:
             self._remote.insert(0, EGO_NAME)
-        self._sights = Sights(instance)
+        self._sights = CarViews(instance)
         self._running = False
         self._moving = False
         self._announced = 0.0
@@ -136,10 +136,7 @@ class Link:
     def command(self, car: str, tick: int) -> tuple[float, float]:
         """Return the speed and yaw rate of `car` that answer frame `tick`, or that are in force.
 
-        Raises
-        ------
-        PeerError
-            If there are none: the peer is silent, gone or at fault, or all is to end.
+        PeerError if there are none: the peer is silent, gone or at fault, or all is to end.
         """
         slot = self.inbox.slot(car)
         until = self.clock.until(tick, self._sent)
@@ -441,28 +438,22 @@ def onward(before: State, seconds: float) -> State:
     return State(x, y, c, s, before.speed, before.yaw_rate, before.count)
 
 
-class Sights:
-    """What each car of one trial sees.
-
-    Parameters
-    ----------
-    instance : Instance
-        The instance of the trial.
-    """
+class CarViews:
+    """What each car of one trial sees."""
 
     def __init__(self, instance: Instance) -> None:
         self._instance = instance
         self._senses: dict[int, Senses] = {}
 
-    def take(self, tick: int, state: State, labels: Labels, own: Callable[[], Observation]) -> None:
+    def take(self, tick: int, state: State, labels: Labels, observe_ego: Callable[[], Observation]) -> None:
         """Take the next frame; `own` returns the ego's observation of it."""
-        self._tick, self._state, self._labels, self._own = tick, state, labels, own
+        self._tick, self._state, self._labels, self._observe_ego = tick, state, labels, observe_ego
         self._seen: dict[int, Observation] = {}
 
     def observe(self, car: int) -> Observation:
         """Return the observation of `car` in the present frame; the ego's is the trial's own."""
         if car == EGO:
-            return self._own()
+            return self._observe_ego()
         if car not in self._seen:
             self._seen[car] = self.sense(car, self._state)
         return self._seen[car]

@@ -164,8 +164,8 @@ class ForeignMaestro:
     def take(self) -> str | None:
         """Return the problem that has been told, once."""
         with self._lock:
-            told, self._told = self._told, None
-        return told
+            problem, self._told = self._told, None
+        return problem
 
 
 @contextmanager

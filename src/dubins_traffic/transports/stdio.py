@@ -62,11 +62,11 @@ class Child:
             )
         except OSError as error:
             raise TransportError(f"can't begin {command[0]}: {error.strerror}") from error
-        own = [
+        descriptors = [
             stream.fileno() for stream in (self._process.stdin, self._process.stdout) if stream is not None
         ]
-        self.questions, self.answers = own
-        for each in own:
+        self.questions, self.answers = descriptors
+        for each in descriptors:
             os.set_blocking(each, False)
 
     def close(self) -> None:

@@ -53,13 +53,13 @@ def world_difference(record: Record) -> Difference | None:
     if not len(record.frames):
         return None
     slack = slack_of(record.instance)
-    found = [
+    differences = [
         _heading(record),
         _motion(record.instance, record.frames, slack),
         _times(record),
         _contacts(record, slack),
     ]
-    return min((one for one in found if one is not None), key=lambda one: one.tick or 0, default=None)
+    return min((one for one in differences if one is not None), key=lambda one: one.tick or 0, default=None)
 
 
 def _heading(record: Record) -> Difference | None:
@@ -95,9 +95,9 @@ def _motion(instance: Instance, frames: Frames, slack: Slack) -> Difference | No
             most = slack.share * way / bounds.turning_radius + slack.radians
             limits.append(("radians turned on a way bound by the turning radius", angle, most))
         for what, values, limit in limits:
-            found = _over(f"{what} in {time:.3f} s", values, limit, step, instance)
-            if found is not None and (worst is None or (found.tick or 0) < (worst.tick or 0)):
-                worst = found
+            over = _over(f"{what} in {time:.3f} s", values, limit, step, instance)
+            if over is not None and (worst is None or (over.tick or 0) < (worst.tick or 0)):
+                worst = over
     return worst
 
 

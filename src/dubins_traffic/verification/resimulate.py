@@ -181,17 +181,17 @@ class _Witness:
         if self._block >= len(record.blocks):
             first = _unequal("event", (), events, record.instance)
             return first or (Difference(f"block {self._block}", None, "frames") if len(frames) else None)
-        found = _columns_differ(record.frames, frames, names)
-        own = record.blocks[self._block]
-        contact = _unequal("contact", own.contacts, frames.contacts, record.instance)
-        if contact is not None and (found is None or (contact.tick or 0) < (found.tick or 0)):
+        difference = _columns_differ(record.frames, frames, names)
+        block_before = record.blocks[self._block]
+        contact = _unequal("contact", block_before.contacts, frames.contacts, record.instance)
+        if contact is not None and (difference is None or (contact.tick or 0) < (difference.tick or 0)):
             return contact
-        if found is not None:
-            return found
-        if (own.first, len(own)) != (frames.first, len(frames)):
-            one, two = (f"{len(block)} frames from {block.first} on" for block in (own, frames))
+        if difference is not None:
+            return difference
+        if (block_before.first, len(block_before)) != (frames.first, len(frames)):
+            one, two = (f"{len(block)} frames from {block.first} on" for block in (block_before, frames))
             return Difference(f"block {self._block}", one, two)
-        return _unequal("event", own.events, events, record.instance)
+        return _unequal("event", block_before.events, events, record.instance)
 
     def _events(self, frames: Frames) -> tuple[Event, ...]:
         """Return the events of a block, the last one as the record would hold it."""

@@ -98,8 +98,12 @@ class Verification:
 
     def _versions(self) -> str:
         """Return the remark on a record of another version of the package, which may have given other results."""
-        own = version(PACKAGE)
-        return "" if own == self.written_by else f" (written by {PACKAGE} {self.written_by}, this is {own})"
+        installed = version(PACKAGE)
+        return (
+            ""
+            if installed == self.written_by
+            else f" (written by {PACKAGE} {self.written_by}, this is {installed})"
+        )
 
 
 OURS = "embedded"

@@ -58,31 +58,31 @@ def written_difference(data: bytes, head: bytes, record: Record) -> Difference |
     whole = len(expected) if is_finished(data) or len(data) > len(expected) else len(data)
     if data[:whole] == expected[:whole] and (record.ending is None or len(data) <= len(expected)):
         return None
-    for own, other in zip_longest(pieces(data), pieces(expected)):
-        found = _piece_difference(own, other)
-        if found is not None:
-            return found
+    for recorded, made in zip_longest(pieces(data), pieces(expected)):
+        difference = _piece_difference(recorded, made)
+        if difference is not None:
+            return difference
     pairs = zip(data, expected, strict=False)
     at = next((k for k, (one, two) in enumerate(pairs) if one != two), min(len(data), len(expected)))
-    found, wanted = (file[at : at + 8].hex() or "the end of the file" for file in (data, expected))
-    return Difference(f"byte {at} of the file", found, wanted)
+    difference, wanted = (file[at : at + 8].hex() or "the end of the file" for file in (data, expected))
+    return Difference(f"byte {at} of the file", difference, wanted)
 
 
-def _piece_difference(own: Piece | None, other: Piece | None) -> Difference | None:
-    if own is None or other is None:
-        number = own.number if own is not None else other.number if other is not None else 0
-        found, wanted = ("a chunk" if piece is not None else None for piece in (own, other))
-        return Difference(f"chunk {number}", found, wanted)
-    for k, (one, two) in enumerate(zip_longest(own.messages, other.messages)):
+def _piece_difference(recorded: Piece | None, made: Piece | None) -> Difference | None:
+    if recorded is None or made is None:
+        number = recorded.number if recorded is not None else made.number if made is not None else 0
+        given, wanted = ("a chunk" if piece is not None else None for piece in (recorded, made))
+        return Difference(f"chunk {number}", given, wanted)
+    for k, (one, two) in enumerate(zip_longest(recorded.messages, made.messages)):
         if one != two:
-            return _message_difference(f"chunk {own.number}, message {k}", one, two)
+            return _message_difference(f"chunk {recorded.number}, message {k}", one, two)
     return None
 
 
 def _message_difference(place: str, one: Entry | None, two: Entry | None) -> Difference:
     if one is None or two is None or one.topic != two.topic:
-        found, wanted = ("a message on " + each.topic if each is not None else None for each in (one, two))
-        return Difference(place, found, wanted)
+        given, wanted = ("a message on " + each.topic if each is not None else None for each in (one, two))
+        return Difference(place, given, wanted)
     place = f"{place} on {one.topic}"
     for name in ("sequence", "log_time", "publish_time"):
         recorded, expected = getattr(one, name), getattr(two, name)
@@ -134,9 +134,9 @@ def header_difference(written: bytes, record: Record) -> Difference | None:
     The instance may be written in more ways than one: what its document leaves out has its default.
     """
     expected = header.document(record.instance, record.controller, record.versions)
-    found = json.loads(written)
-    different = unlike("header", {**found, "instance": None}, _as_json({**expected, "instance": None}))
-    if different is None and header.as_message(found) != written:
+    document = json.loads(written)
+    different = unlike("header", {**document, "instance": None}, _as_json({**expected, "instance": None}))
+    if different is None and header.as_message(document) != written:
         return Difference("header", "other text", "JSON as it is written, each key once")
     return different
 
@@ -157,11 +157,11 @@ def score_difference(record: Record, scores: Sequence[Mapping[str, Any]]) -> Dif
     printed = entry_of(name, scores)
     if printed is None:
         return Difference("score", None, f"a score of {name}")
-    found, expected = dict(printed), _as_json(score(record).to_json())
-    found.pop("metrics", None)
+    shown_score, expected = dict(printed), _as_json(score(record).to_json())
+    shown_score.pop("metrics", None)
     for left_out in ("record", "time_to_begin_s"):
-        found[left_out] = expected[left_out] = None
-    return unlike("score", found, expected)
+        shown_score[left_out] = expected[left_out] = None
+    return unlike("score", shown_score, expected)
 
 
 def unlike(path: str, recorded: object, expected: object) -> Difference | None:
@@ -169,13 +169,15 @@ def unlike(path: str, recorded: object, expected: object) -> Difference | None:
     if isinstance(recorded, dict) and isinstance(expected, dict):
         one, two = cast("dict[str, object]", recorded), cast("dict[str, object]", expected)
         for name in [*two, *(name for name in one if name not in two)]:
-            found = unlike(f"{path}.{name}", one.get(name), two.get(name))
-            if found is not None or (name in one) != (name in two):
-                return found or Difference(f"{path}.{name}", one.get(name), two.get(name))
+            difference = unlike(f"{path}.{name}", one.get(name), two.get(name))
+            if difference is not None or (name in one) != (name in two):
+                return difference or Difference(f"{path}.{name}", one.get(name), two.get(name))
         return None
     if isinstance(recorded, list) and isinstance(expected, list):
         rows = zip_longest(cast("list[object]", recorded), cast("list[object]", expected))
-        return next((found for k, pair in enumerate(rows) if (found := unlike(f"{path}[{k}]", *pair))), None)
+        return next(
+            (difference for k, pair in enumerate(rows) if (difference := unlike(f"{path}[{k}]", *pair))), None
+        )
     if json.dumps(recorded) == json.dumps(expected):
         return None
     return Difference(path, recorded, expected)
@@ -229,8 +231,8 @@ def verify(
     beside = None if stdin or scores is not None else sheet_beside(Path(name))
     if beside is None:
         return _verified(reader.from_bytes(data, name), data, instance, scores)
-    path, own = beside
-    return replace(_verified(reader.from_bytes(data, name), data, instance, own), sheet=str(path))
+    path, sheet = beside
+    return replace(_verified(reader.from_bytes(data, name), data, instance, sheet), sheet=str(path))
 
 
 def _verified(
@@ -266,17 +268,17 @@ def _verified(
 def _first_difference(record: Record, data: bytes, expected: Instance | None) -> Difference | None:
     other = None if expected is None else instance_difference(record, expected)
     head = next(pieces(data)).messages[0].data
-    found = other or header_difference(head, record) or _earlier(record)
-    return found or written_difference(data, head, record)
+    difference = other or header_difference(head, record) or _earlier(record)
+    return difference or written_difference(data, head, record)
 
 
 def _earlier(record: Record) -> Difference | None:
     """Return the earlier of two differences: from the bounds of another world, or from simulating again."""
-    found = [
+    differences = [
         None if record.instance.simulator == OURS else world_difference(record),
         trial_difference(record),
     ]
-    return min((one for one in found if one is not None), key=lambda one: one.tick or 0, default=None)
+    return min((one for one in differences if one is not None), key=lambda one: one.tick or 0, default=None)
 
 
 def _unchecked(record: Record) -> tuple[str, ...]:

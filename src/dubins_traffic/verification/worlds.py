@@ -97,15 +97,7 @@ MEASURED: Final = "ros1-world"
 
 
 class Replayed:
-    """Drives some cars by their recorded commands (a `protocols.Driver`).
-
-    Parameters
-    ----------
-    frames : Frames
-        The whole trial.
-    cars : sequence of int
-        Which of its cars.
-    """
+    """Drives some cars by their recorded commands (a `protocols.Driver`)."""
 
     def __init__(self, frames: Frames, cars: Sequence[int]) -> None:
         self._cars = list(cars)
@@ -195,17 +187,17 @@ class FromPoses:
 
     def step(self, commands: Floats) -> Sequence[Sequence[Contact]]:
         """Go to the next frame and return the contacts on the way there, and those of bodies that overlap there."""
-        (found,) = self._world.step(commands)
+        (contacts,) = self._world.step(commands)
         self._tick += 1
         put_frame(self.state, self._frames, self._tick)
-        self._meetings.note((*found, *self._soon.get(self._tick + 1, ())))
-        own = tuple(
+        self._meetings.note((*contacts, *self._soon.get(self._tick + 1, ())))
+        touching = tuple(
             self._at_frames.contact(self._tick, self.state, pair)
             for pair, gap in self._meetings.gaps(self._tick, self.state)
             if gap <= -self._slack
         )
-        self._meetings.note(own)
-        return [(*found, *own)]
+        self._meetings.note(touching)
+        return [(*contacts, *touching)]
 
     def close(self) -> None:
         """Close the simulator within."""
@@ -214,10 +206,10 @@ class FromPoses:
 
 def by_tick(contacts: Sequence[Contact]) -> dict[int, list[Contact]]:
     """Return contacts by the frames in which their ticks end."""
-    found: dict[int, list[Contact]] = {}
+    contacts_by_tick: dict[int, list[Contact]] = {}
     for contact in contacts:
-        found.setdefault(contact.tick, []).append(contact)
-    return found
+        contacts_by_tick.setdefault(contact.tick, []).append(contact)
+    return contacts_by_tick
 
 
 def from_poses(record: Record) -> Record:
@@ -242,8 +234,8 @@ def from_poses(record: Record) -> Record:
             break
         trial.advance((speed, yaw_rate))
     trial.close()
-    found = replace(joined(kept.blocks), events=frames.events)
-    return replace(record, frames=found, blocks=(found,))
+    frames_of_poses = replace(joined(kept.blocks), events=frames.events)
+    return replace(record, frames=frames_of_poses, blocks=(frames_of_poses,))
 
 
 class _Kept:

@@ -9,27 +9,10 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Frames
 from dubins_traffic.problem.instance import Instance, Problem
+from dubins_traffic.rules.explained import RULE_WORDS
 from dubins_traffic.scoring.formulas import FormulaVerdict
 from dubins_traffic.scoring.verdict import EGO_NAME, Ruling, Verdict, Violation
 from dubins_traffic.viewer.scene import short
-
-RULES = {
-    "1.collision": "touches another body",
-    "1.road": "leaves the road",
-    "2.left": "reaches over the centre line",
-    "2.return": "stays over the centre line",
-    "2.turn": "turns round on a road",
-    "3.stop": "enters a crossing without a stop",
-    "3.order": "enters a crossing before its turn",
-    "3.clear": "enters a crossing that is taken",
-    "E2": "is at fault in a collision",
-    "E3.enter": "is first at a clear crossing and does not enter",
-    "E3.tickets": "loses its place in the order",
-    "E4": "stays in a disc with a free exit",
-    "E5": "takes too long from one intersection to another",
-    "E6": "keeps a goal taken",
-}
-"""What a car does that breaks a rule, in words."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,9 +85,9 @@ def breach_marks(instance: Instance, violations: Sequence[Violation]) -> list[Ma
 
 def breach_text(violation: Violation) -> str:
     """Return in words who broke which rule, and how: ``agent0 breaks E4: stays in a disc with a free exit``."""
-    words = RULES.get(violation.rule)
+    words = RULE_WORDS.get(violation.rule)
     text = f"{violation.car} breaks {violation.rule}"
-    return text if words is None else f"{text}: {words}"
+    return text if words is None else f"{text}: {words.deed}"
 
 
 def verdict_text(verdict: Verdict) -> str:
@@ -125,7 +108,7 @@ def verdict_text(verdict: Verdict) -> str:
     when = "at the same instant" if fall.tick == own.tick else f"at {fall.time:.2f} s"
     place = fall.where.intersection
     where = "" if place is None else f" near ({place[0]}, {place[1]})"
-    words = RULES.get(fall.rule, "a rule broken")
+    words = RULE_WORDS[fall.rule].deed if fall.rule in RULE_WORDS else "a rule broken"
     seen = "the ego sensed it" if excuse.sensed else "the ego did not sense it"
     return f"{breach}. It is excused by {fall.car}, which broke {fall.rule} {when}{where} ({words}); {seen}."
 

@@ -16,7 +16,7 @@ from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import BY_CONTROLLER
-from dubins_traffic.scoring.columns import REPORTED, SECOND
+from dubins_traffic.scoring.columns import REPORTED, SCORES, SECOND
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, Ruling, was_cut
@@ -36,6 +36,8 @@ FAULTS: Mapping[str, str] = {
     "collisions_both_fault": "both",
 }
 """Collisions of the ego by who was at fault."""
+RANKING: tuple[Column, ...] = tuple(SCORES[name].column for name in ("counted_rounds", SECOND))
+"""What ranks controllers, and what ranks those that are equal in it."""
 HELD: tuple[str, ...] = get_args(Status)
 """What can hold of a formula of the user's own."""
 
@@ -114,7 +116,8 @@ class Level:
 class Comparison:
     """A campaign compared: `trials` of `total` have rows, `metrics` are those of which there are values.
 
-    `undefined` are those that are defined for none of the trials.
+    `undefined` are those that are defined for none of the trials. `merits` are the differences in the columns that rank
+    (`RANKING`), where a trial that came to nothing counts 0.
 
     `controllers` are ranked by their counted rounds a trial, most first, where a trial that came to nothing has none;
     all else follows that order. The e-agents broke the assumption in `broken` of the `judged` trials.
@@ -130,6 +133,7 @@ class Comparison:
     undefined: Sequence[Column]
     standings: Sequence[Standing]
     differences: Sequence[Difference]
+    merits: Sequence[Difference]
     levels: Sequence[Level]
     factors: Mapping[str, Sequence[str]]
 
@@ -146,23 +150,24 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
     wall : pyarrow.Table, optional
         The wall-clock figures of the same trials.
     """
-    metrics = (*REPORTED, *(own for own in campaign.columns if own.kind != "string"))
-    values = {metric.name: _floats(results[metric.name]) for metric in metrics}
+    metrics = metrics_of(campaign)
+    values = {metric.name: floats(results[metric.name]) for metric in metrics}
     if wall is not None:
-        values |= {metric.name: _floats(wall[metric.name]) for metric in WALL_METRICS}
+        values |= {metric.name: floats(wall[metric.name]) for metric in WALL_METRICS}
     known = [
         metric
         for metric in (*metrics, *WALL_METRICS)
         if metric.name in values and _is_told(metric, values[metric.name])
     ]
     names: Any = np.array(results["controller"].to_pylist(), dtype=object)
-    ranked = _ranked(campaign, names, [_floats(results[name]) for name in ("counted_rounds", SECOND)])
-    chosen = {name: names == name for name in ranked}
-    fallen = _floats(results["assumption_broken"])
+    merits = {metric.name: np.nan_to_num(floats(results[metric.name])) for metric in RANKING}
+    order = ranked(campaign, results)
+    chosen = {name: names == name for name in order}
+    fallen = floats(results["assumption_broken"])
     factors = _factors(campaign)
     return Comparison(
         campaign,
-        ranked,
+        order,
         len(results),
         campaign.total,
         int((fallen > 0).sum()),
@@ -171,17 +176,28 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
         [metric for metric in metrics if metric.bounded and metric not in known],
         [_standing(name, results.filter(_mask(own)), known, values, own) for name, own in chosen.items()],
         list(_differences(campaign, results, chosen, known, values)),
+        list(_differences(campaign, results, chosen, RANKING, merits)),
         list(_levels(results, factors, chosen, known, values)),
         factors,
     )
 
 
-def _ranked(campaign: Campaign, names: Any, columns: Sequence[Floats]) -> list[str]:
-    """Return the controllers, those with the largest means of the first column first; ties by the second, the file."""
+def metrics_of(campaign: Campaign) -> tuple[Column, ...]:
+    """Return the metrics of a campaign's table that are numbers: those of every score, and further ones."""
+    return (*REPORTED, *(own for own in campaign.columns if own.kind != "string"))
+
+
+def ranked(campaign: Campaign, results: Any) -> list[str]:
+    """Return the controllers, those with the largest means of the first of `RANKING` first; ties by the second.
+
+    A trial that came to nothing counts 0.
+    """
+    names: Any = np.array(results["controller"].to_pylist(), dtype=object)
+    columns = [np.nan_to_num(floats(results[metric.name])) for metric in RANKING]
 
     def merit(name: str) -> list[float]:
         own = names == name
-        return [float(np.nan_to_num(column[own]).sum()) / max(1, int(own.sum())) for column in columns]
+        return [float(column[own].sum()) / max(1, int(own.sum())) for column in columns]
 
     return sorted(campaign.controllers, key=merit, reverse=True)
 
@@ -207,7 +223,7 @@ def _standing(
     cut = sum(map(was_cut, verdicts, clean, ends))
 
     def happened(column: str) -> Share:
-        return share(int((_floats(own[column]) > 0).sum()), judged)
+        return share(int((floats(own[column]) > 0).sum()), judged)
 
     return Standing(
         controller,
@@ -217,13 +233,13 @@ def _standing(
         share(clean.count(True), judged - cut + nothing if judged else 0),
         cut,
         share(sum(ends.count(end) for end in BY_CONTROLLER), len(ends)),
-        share(int((_floats(own["near"]) > 0).sum()), verdicts.count(Ruling.EXCUSED.value)),
+        share(int((floats(own["near"]) > 0).sum()), verdicts.count(Ruling.EXCUSED.value)),
         {verdict: share(verdicts.count(verdict), judged) for verdict in seen} if judged else {},
         {end: share(ends.count(end), len(ends)) for end in sorted(set(ends))},
         {rule: happened(f"breaches.{rule}") for rule in EGO_RULES} if judged else {},
         {part: happened(f"breaches_of_others.{part}") for part in ASSUMPTIONS} if judged else {},
-        int(np.nansum(_floats(own["collisions"]))),
-        {who: int(np.nansum(_floats(own[column]))) for column, who in FAULTS.items()},
+        int(np.nansum(floats(own["collisions"]))),
+        {who: int(np.nansum(floats(own[column]))) for column, who in FAULTS.items()},
         _formulas(own["formulas"].to_pylist()),
     )
 
@@ -284,7 +300,7 @@ def _levels(
                     yield Level(factor, level, controller, metric, found)
 
 
-def _floats(column: Any) -> Floats:
+def floats(column: Any) -> Floats:
     """Return a column of numbers or switches as floats, NaN where it has none."""
     made = rows.arrow()
     return (
@@ -306,3 +322,8 @@ def shown(value: float | None) -> str:
 def words(name: str) -> str:
     """Return the name of a factor or of an end as people write it."""
     return name.replace("e_agent", "e-agent").replace("_", " ")
+
+
+def number_of(count: int, one: str, many: str = "") -> str:
+    """Return a number with what it counts, in the singular or the plural."""
+    return f"{count:,} {one if count == 1 else many or one + 's'}"

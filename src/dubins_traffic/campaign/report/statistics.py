@@ -77,6 +77,26 @@ def estimate(values: Floats, *, median: bool = True) -> Estimate:
     return Estimate(count, mean, about, middle, between)
 
 
+def apart(first: Floats, second: Floats) -> tuple[float | None, Interval | None]:
+    """Return how much the mean of independent values exceeds that of others, with its 95 % interval; NaN are left out.
+
+    The interval holds percentiles of 1,000 bootstrap resamples of both; beyond `MOST` values it is the normal one.
+    """
+    one, other = (values[~np.isnan(values)] for values in (first, second))
+    if not len(one) or not len(other):
+        return None, None
+    mean = float(other.mean() - one.mean())
+    if max(len(one), len(other)) > MOST:
+        half = NORMAL * math.sqrt(sum(float(values.var()) / len(values) for values in (one, other)))
+        return mean, (mean - half, mean + half)
+    draws = np.random.default_rng(SEED)
+    resampled = [
+        values[draws.integers(0, len(values), (RESAMPLES, len(values)))].mean(axis=-1)
+        for values in (one, other)
+    ]
+    return mean, _between(resampled[1] - resampled[0])
+
+
 def share(count: int, total: int) -> Share:
     """Return a share of trials."""
     return (

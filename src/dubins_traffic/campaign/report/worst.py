@@ -13,7 +13,7 @@ import numpy as np
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.chunks import Chunk
-from dubins_traffic.campaign.report.comparison import words
+from dubins_traffic.campaign.report.comparison import number_of, words
 from dubins_traffic.campaign.table import FACTOR, places
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats, Ints
@@ -98,13 +98,13 @@ def why(row: Mapping[str, Any]) -> str:
     found: list[str] = []
     at_fault = (row["collisions_ego_fault"] or 0) + (row["collisions_both_fault"] or 0)
     if row["collisions"]:
-        found.append(f"{row['collisions']} collisions, {at_fault} with the ego at fault")
+        found.append(f"{number_of(row['collisions'], 'collision')}, {at_fault} with the ego at fault")
     if row["breaches"]:
-        found.append(f"{row['breaches']} breaches, {row['verdict']}")
+        found.append(f"{number_of(row['breaches'], 'breach', 'breaches')}, {row['verdict']}")
     if not found:
         whole = "" if row["end"] == End.DURATION else f", {words(row['end'])} after {row['duration_s']:.1f} s"
-        counted, rounds = row["counted_rounds"], row["rounds"]
-        some = f"{rounds} rounds" if counted == rounds else f"{counted} of {rounds} rounds count"
+        kept, rounds = row["counted_rounds"], row["rounds"]
+        some = number_of(rounds, "round") if kept == rounds else f"{kept} of {rounds} rounds count"
         found.append(f"{row['goals_visited']:.0%} of the goals visited, {some}{whole}")
     return "; ".join(found)
 

@@ -1,4 +1,4 @@
-"""Writing the report of a campaign: its page, its numbers as CSV and in a terminal, and replays of its worst trials.
+"""Writing the report of a campaign: its page, its numbers as CSV, its table for LaTeX, and replays of worst trials.
 
 The page is self-contained HTML, except for the replays beside it, to which it links.
 """
@@ -8,30 +8,29 @@ from __future__ import annotations
 import csv
 import io
 import os
-import shlex
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import manifest, rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.report import plots
-from dubins_traffic.campaign.report.comparison import Comparison, compare, shown, words
+from dubins_traffic.campaign.report.comparison import RANKING, Comparison, compare, number_of, shown, words
+from dubins_traffic.campaign.report.conclusion import conclusion
+from dubins_traffic.campaign.report.latex import latex_table
 from dubins_traffic.campaign.report.plots import figures
 from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share, distributions, share
 from dubins_traffic.campaign.report.worst import OTHER_WAY, Bad, replay, replay_name, same
 from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import make_folder, require_output, write_text
-from dubins_traffic.rules.clauses import clause
+from dubins_traffic.files import make_folder, replace_file, require_output, write_text
+from dubins_traffic.rules.clauses import explain
 from dubins_traffic.scoring.notice import assumption_notice
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, told_cut
 from dubins_traffic.viewer.pages import PAGES, render
-
-if TYPE_CHECKING:
-    from rich.table import Table
 
 MINUS = "\N{MINUS SIGN}"
 
@@ -49,13 +48,16 @@ def page(comparison: Comparison, manifest: Mapping[str, Any], worst: Mapping[str
         The worst trials of each controller.
     """
     standings = comparison.standings
-    carried = list(dict.fromkeys(name for own in standings for name in own.formulas))
+    carried = _formulas(comparison)
     return render(
         "campaign/report/report.html",
         title=comparison.campaign.model.name,
         comparison=comparison,
         standings=standings,
         told=_facts(comparison),
+        conclusion=conclusion(comparison),
+        ranking=plots.ranking(comparison),
+        ranks=RANKING,
         missing=comparison.total - comparison.trials,
         notice=assumption_notice(comparison.broken, comparison.judged),
         colours=[plots.colour(k) for k in range(len(comparison.controllers))],
@@ -68,7 +70,7 @@ def page(comparison: Comparison, manifest: Mapping[str, Any], worst: Mapping[str
         ended="ended by the controller",
         held=list(plots.FORMULA),
         formulas={name: [own for own in standings if name in own.formulas] for name in carried},
-        formula_charts=[(f"Verdicts on {name}", plots.formula(comparison, name)) for name in carried],
+        formula_charts=_formula_charts(comparison),
         pairs=list(dict.fromkeys((one.first, one.second) for one in comparison.differences)),
         factors=[_against(comparison, factor) for factor in comparison.factors],
         worst=worst,
@@ -84,31 +86,41 @@ def _facts(comparison: Comparison) -> list[str]:
     campaign = comparison.campaign
     cells = len(campaign.cells)
     return [
-        f"{comparison.trials:,} trials",
-        f"{len(campaign.controllers)} controllers",
-        f"{cells} combination{'s' if cells > 1 else ''} of configuration and factors",
+        number_of(comparison.trials, "trial"),
+        number_of(len(campaign.controllers), "controller"),
+        f"{number_of(cells, 'combination')} of configuration and factors",
         f"seed {campaign.model.seed}",
     ]
 
 
-def _overview(comparison: Comparison) -> list[tuple[str, str]]:
-    charts: list[tuple[str, str]] = []
+def charts(comparison: Comparison) -> list[plots.Chart]:
+    """Return all charts of the page, which are written for papers, too."""
+    found = [plots.ranking(comparison), *_overview(comparison), *_formula_charts(comparison)]
+    return [*found, *(chart for factor in comparison.factors for chart in _against(comparison, factor)[1])]
+
+
+def _overview(comparison: Comparison) -> list[plots.Chart]:
+    found: list[plots.Chart] = []
     if any(standing.verdicts for standing in comparison.standings):
-        charts.append(("Shares of the verdicts", plots.verdicts(comparison)))
+        found.append(plots.verdicts(comparison))
     if not plots.no_faults(comparison):
-        charts.append(("Collisions by fault", plots.faults(comparison)))
-    return charts
+        found.append(plots.faults(comparison))
+    return found
 
 
-def _against(comparison: Comparison, factor: str) -> tuple[str, list[tuple[str, str]], list[Any]]:
+def _formulas(comparison: Comparison) -> list[str]:
+    return list(dict.fromkeys(name for own in comparison.standings for name in own.formulas))
+
+
+def _formula_charts(comparison: Comparison) -> list[plots.Chart]:
+    return [plots.formula(comparison, name, k) for k, name in enumerate(_formulas(comparison), 1)]
+
+
+def _against(comparison: Comparison, factor: str) -> tuple[str, list[plots.Chart], list[Any]]:
     """Return a factor, the charts against it, and the metrics that have none: 0 or absent everywhere."""
     silent = [metric for metric in comparison.metrics if plots.says_nothing(comparison, factor, metric)]
-    charts = [
-        (f"{metric.heading} against {words(factor)}", plots.against(comparison, factor, metric))
-        for metric in comparison.metrics
-        if metric not in silent
-    ]
-    return factor, charts, silent
+    shown_ones = [metric for metric in comparison.metrics if metric not in silent]
+    return factor, [plots.against(comparison, factor, metric) for metric in shown_ones], silent
 
 
 def _page_shares(comparison: Comparison) -> list[tuple[str, list[str], list[str], list[Any], str]]:
@@ -122,7 +134,7 @@ def _page_shares(comparison: Comparison) -> list[tuple[str, list[str], list[str]
     found: list[tuple[str, list[str], list[str], list[Any], str]] = []
     for title, shares in groups.items():
         names = list(dict.fromkeys(name for group in shares for name in group))
-        cited = ", ".join(clause(name) for name in names if name in (*EGO_RULES, *ASSUMPTIONS))
+        cited = next((explain(name) for name in names if name in (*EGO_RULES, *ASSUMPTIONS)), "")
         if names:
             heads = [words(name) for name in names]
             found.append((title, names, heads, list(zip(standings, shares, strict=True)), cited))
@@ -149,6 +161,8 @@ ESTIMATE = ("count", "mean", "mean_low", "mean_high", "median", "median_low", "m
 SHARE = ("count", "of", "share", "low", "high")
 REPORT = "report"
 PAGE = "index.html"
+TABLE = "table.tex"
+FIGURES = "figures"
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,6 +184,8 @@ def write_report(
     overwrite: bool = False,
 ) -> Written:
     """Compare the controllers of a campaign and write a page, its numbers as CSV and the replays it links to.
+
+    For papers there are a table for LaTeX and the charts as PDF.
 
     The same folder gives the same bytes. An unfinished campaign is compared as far as it has come.
 
@@ -195,19 +211,15 @@ def write_report(
     MissingExtraError
         Without the extra `campaign`.
     """
-    rows.arrow()
     figures()
     distributions()
-    place = Path(folder)
-    known, campaign, parts = _open(place)
-    results = table.read(place, campaign, parts)
-    if not len(results):
-        raise InputError("nothing is finished yet", file=str(place), expected="a campaign that has begun")
+    place, known, campaign, results = open_campaign(folder)
+    parts = [path for _, _, path in folders.parts(place)]
     clock = table.read(place, campaign, parts, table.Kind.WALL) if wall else None
     comparison = compare(campaign, results, clock)
     target = place / REPORT if output is None else Path(output)
     make_folder(target, "a report")
-    texts = csv_files(comparison)
+    texts = {**csv_files(comparison), TABLE: latex_table(comparison)}
     for name in (PAGE, *texts):
         suffix = Path(name).suffix
         require_output(target / name, "a report", [suffix], overwrite=overwrite or output is None)
@@ -215,6 +227,9 @@ def write_report(
     bad = find_worst(campaign, results, ranked, worst, target, progress or _silent) if worst else {}
     for name, text in texts.items():
         write_text(target / name, text)
+    make_folder(target / FIGURES, "a report")
+    for chart in charts(comparison):
+        replace_file(target / FIGURES / f"{chart.name}.pdf", partial(Path.write_bytes, data=chart.pdf))
     write_text(target / PAGE, page(comparison, known, bad))
     return Written(comparison, bad, target / PAGE)
 
@@ -248,9 +263,7 @@ def replay_trial(
     """
     if output is not None:
         require_output(output, "a page", PAGES, overwrite=overwrite)
-    place = Path(folder)
-    _, campaign, parts = _open(place)
-    results = table.read(place, campaign, parts)
+    place, _, campaign, results = open_campaign(folder)
     compute: Any = rows.arrow().compute
     found = results.filter(compute.equal(results["number"], number)).to_pylist()
     if not found:
@@ -265,14 +278,28 @@ def replay_trial(
     return target, "" if same(found[0], again) else OTHER_WAY
 
 
-def _open(place: Path) -> tuple[Mapping[str, Any], Campaign, Sequence[Path]]:
-    """Return the manifest of a folder, its campaign and the parts of its table."""
+def open_campaign(folder: str | os.PathLike[str]) -> tuple[Path, Mapping[str, Any], Campaign, Any]:
+    """Return the folder of a campaign, its manifest, the campaign and its table, of what is finished.
+
+    Raises
+    ------
+    InputError
+        If there is no campaign in `folder`, nothing of it is finished, or its table can't be read.
+    MissingExtraError
+        Without the extra `campaign`.
+    """
+    rows.arrow()
+    place = Path(folder)
     known = manifest.read(place)
     if known is None:
         raise InputError(
             "no campaign", file=str(place), expected="the folder of a campaign, with manifest.json"
         )
-    return known, manifest.stored_campaign(place, known), [path for _, _, path in folders.parts(place)]
+    campaign = manifest.stored_campaign(place, known)
+    found = table.read(place, campaign, [path for _, _, path in folders.parts(place)])
+    if not len(found):
+        raise InputError("nothing is finished yet", file=str(place), expected="a campaign that has begun")
+    return place, known, campaign, found
 
 
 def _silent(_done: int, _total: int) -> None:
@@ -348,97 +375,3 @@ def _csv_text(headings: Sequence[str], rows: Iterator[Sequence[object]]) -> str:
     writer.writerow(headings)
     writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
     return stream.getvalue()
-
-
-def tables(comparison: Comparison) -> Iterator[Table]:
-    """Return the tables that are printed: metrics, paired differences, verdicts and faults; they fit 80 columns."""
-    yield _metric_table(comparison)
-    if comparison.differences:
-        yield _difference_table(comparison)
-    yield _share_table(comparison)
-
-
-def worst_lines(worst: Mapping[str, Sequence[Bad]], folder: str) -> Iterator[str]:
-    """Return what is said of the worst trials of a campaign in `folder`: two lines each, the second a command."""
-    for controller, trials in worst.items():
-        for bad in trials:
-            row = bad.row
-            place = ", ".join(
-                [row["configuration"], *bad.factors, f"trial {row['trial']} of seed {row['seed']}"]
-            )
-            note = f" ({bad.note})" if bad.note else ""
-            yield f"{controller}, {place}: {bad.why}{note}"
-            yield f"    dubins-traffic campaign replay {shlex.quote(folder)} {row['number']}"
-
-
-def _metric_table(comparison: Comparison) -> Table:
-    table = _table(f"{comparison.campaign.model.name}: {comparison.trials} of {comparison.total} trials")
-    _columns(table, ("metric", "controller"), ("mean", "95 %", "median", "95 %"))
-    for metric in comparison.metrics:
-        for k, standing in enumerate(comparison.standings):
-            one = standing.estimates[metric.name]
-            mean = (shown(one.mean), _interval(one.mean_interval))
-            median = (shown(one.median), _interval(one.median_interval))
-            table.add_row(metric.heading if k == 0 else "", standing.controller, *mean, *median)
-    for metric in comparison.undefined:
-        table.add_row(metric.heading, "", "not defined", "", "", "")
-    return table
-
-
-def _difference_table(comparison: Comparison) -> Table:
-    table = _table("differences on the same instances; in bold those whose interval leaves out 0")
-    _columns(table, ("metric", "controllers"), ("mean", "95 %", "more", "less"))
-    for one in comparison.differences:
-        interval = _interval(one.estimate.mean_interval)
-        numbers = (shown(one.estimate.mean), interval, str(one.larger), str(one.smaller))
-        pair = f"{one.first} - {one.second}"
-        table.add_row(one.metric.heading, pair, *numbers, style="bold" if one.is_decided else "")
-    return table
-
-
-def _share_table(comparison: Comparison) -> Table:
-    table = _table("clean, verdicts, ends, collisions by fault, formulas")
-    _columns(table, ("what", "controller"), ("trials", "share", "95 %"))
-    for standing in comparison.standings:
-        judged = {"clean": standing.clean} if standing.judged else {}
-        near = {"excused, near": standing.near} if standing.near.total else {}
-        ended = {"ended by the controller": standing.ended} if standing.ended.count else {}
-        for name, counted in {**judged, **standing.verdicts, **near, **ended, **standing.ends}.items():
-            table.add_row(words(name), standing.controller, str(counted.count), *_share_cell(counted))
-        if standing.cut:
-            table.add_row("cut", standing.controller, str(standing.cut), "", "")
-        for who, count in standing.faults.items():
-            table.add_row(f"fault of {who}", standing.controller, str(count), "", "")
-        for name, found in standing.formulas.items():
-            for verdict, counted in found.items():
-                table.add_row(
-                    f"{name}: {verdict}", standing.controller, str(counted.count), *_share_cell(counted)
-                )
-    return table
-
-
-def _table(title: str) -> Table:
-    from rich import box
-    from rich.table import Table
-
-    return Table(
-        box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, title=title, title_justify="left"
-    )
-
-
-def _columns(table: Table, names: tuple[str, ...], numbers: tuple[str, ...]) -> None:
-    for name in names:
-        table.add_column(name, overflow="fold")
-    for name in numbers:
-        table.add_column(name, justify="right", no_wrap=True)
-
-
-def _interval(interval: Interval | None) -> str:
-    return "" if interval is None else f"{shown(interval[0])} .. {shown(interval[1])}"
-
-
-def _share_cell(share: Share) -> tuple[str, str]:
-    if share.share is None or share.interval is None:
-        return shown(None), ""
-    low, high = share.interval
-    return f"{share.share:.1%}", f"{low:.1%} .. {high:.1%}"

@@ -18,7 +18,7 @@ from dubins_traffic.rules.parameters import RuleParameters
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem
 
-KEPT = "the rules of the road and the shield are kept by standing at once, with no stopping distance (docs/shield.md),"
+KEPT = "the rules of the road and the shield are kept by standing at once, with no stopping distance,"
 """Why other cars than the Dubins car are refused."""
 LONG = 1.2
 """Largest rho, in units of w, with which cars in one disc can turn beside each other."""

@@ -24,12 +24,12 @@ MODULES = (signal, socket, struct, subprocess, threading)
 
 def call(number: int, *arguments: Any) -> int:
     """Make a system call; OSError if it fails."""
-    own = [ctypes.c_long(each) if isinstance(each, int) else each for each in arguments]
-    found: int = libc.syscall(ctypes.c_long(number), *own)
-    if found == -1:
+    converted = [ctypes.c_long(each) if isinstance(each, int) else each for each in arguments]
+    result: int = libc.syscall(ctypes.c_long(number), *converted)
+    if result == -1:
         error = ctypes.get_errno()
         raise OSError(error, os.strerror(error))
-    return found
+    return result
 
 
 def text(path: str, most: int = 4096) -> str:

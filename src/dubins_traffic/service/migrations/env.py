@@ -5,7 +5,7 @@ from __future__ import annotations
 from alembic import context
 from sqlalchemy import Connection, create_engine
 
-from dubins_traffic.service.tables import Base
+from dubins_traffic.service.database_tables import Base
 
 
 def run(connection: Connection) -> None:

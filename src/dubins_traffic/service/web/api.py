@@ -13,9 +13,9 @@ from prometheus_client import CollectorRegistry, Gauge, generate_latest
 from sqlalchemy import func, select
 
 from dubins_traffic.service import receiving, standings, viewing
+from dubins_traffic.service.database_tables import Competition, Submission
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service, competition_of
-from dubins_traffic.service.tables import Competition, Submission
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
 
@@ -40,20 +40,20 @@ class Api(Controller):
     def status(self, service: ServiceHere) -> dict[str, Any]:
         """Return how long the queue is, and how many workers there are."""
         with service.database.reading() as session:
-            return viewing.told_status(service, session)
+            return viewing.status_document(service, session)
 
     @get("/competitions", sync_to_thread=True)
     def competitions(self, service: ServiceHere) -> list[dict[str, Any]]:
         """Return all competitions."""
         with service.database.reading() as session:
             rows = session.scalars(select(Competition).order_by(Competition.id)).all()
-            return [viewing.told_competition(service, row) for row in rows]
+            return [viewing.competition_document(service, row) for row in rows]
 
     @get("/competitions/{slug:str}", sync_to_thread=True)
     def competition(self, service: ServiceHere, slug: Name) -> dict[str, Any]:
         """Return a competition and its phases."""
         with service.database.reading() as session:
-            return viewing.told_competition(service, _found(session, slug))
+            return viewing.competition_document(service, _found(session, slug))
 
     @get("/competitions/{slug:str}/file", sync_to_thread=True)
     def file(self, service: ServiceHere, slug: Name) -> dict[str, Any]:
@@ -66,7 +66,7 @@ class Api(Controller):
         """Return the table of a phase, as far as it may be seen."""
         at = service.clock()
         with service.database.reading() as session:
-            row = receiving.found_phase(session, slug, name)
+            row = receiving.phase_named(session, slug, name)
             if not viewing.sees_table(row, viewer.account, at):
                 return []
             latest = standings.latest_standing(session, row, service.hiding(row))
@@ -93,12 +93,15 @@ class Api(Controller):
     ) -> list[dict[str, Any]]:
         """Return the submissions of the own team to a phase, newest first."""
         with service.database.reading() as session:
-            row = receiving.found_phase(session, slug, name)
+            row = receiving.phase_named(session, slug, name)
             if viewer.person.team_id is None:
                 return []
             places = viewing.places_of(session)
-            found = receiving.submissions_of(session, row, viewer.person.team_id)
-            return [viewing.told_submission(service, session, one, viewer.person, places) for one in found]
+            its_submissions = receiving.submissions_of(session, row, viewer.person.team_id)
+            return [
+                viewing.submission_document(service, session, one, viewer.person, places)
+                for one in its_submissions
+            ]
 
     @post(
         "/competitions/{slug:str}/phases/{name:str}/submissions",
@@ -139,10 +142,12 @@ class Api(Controller):
     @get("/submissions/{number:int}/logs", sync_to_thread=True, guards=[requests.person])
     def logs(self, service: ServiceHere, viewer: ViewerHere, number: Number) -> dict[str, Any]:
         """Return the logs of a submission that may be seen: of all trials, or the tail of one."""
-        told = _view(service, viewer, number)
-        if "trials" in told:
-            return {"trials": [{"number": own["number"], "log": own["log"]} for own in told["trials"]]}
-        return {"log": told.get("log", "")}
+        submission = _view(service, viewer, number)
+        if "trials" in submission:
+            return {
+                "trials": [{"number": trial["number"], "log": trial["log"]} for trial in submission["trials"]]
+            }
+        return {"log": submission.get("log", "")}
 
 
 def _found(session: viewing.Session, slug: str) -> Competition:
@@ -154,8 +159,10 @@ def _found(session: viewing.Session, slug: str) -> Competition:
 
 def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
     with service.database.reading() as session:
-        found = receiving.found_submission(session, number, viewer.account)
-        return viewing.told_submission(service, session, found, viewer.account, viewing.places_of(session))
+        submission = receiving.submission_numbered(session, number, viewer.account)
+        return viewing.submission_document(
+            service, session, submission, viewer.account, viewing.places_of(session)
+        )
 
 
 @get("/metrics", sync_to_thread=True, include_in_schema=False)
@@ -165,7 +172,7 @@ def metrics(service: ServiceHere, viewer: ViewerHere) -> Response[bytes]:
         raise NotAuthorizedException("numbers are for organisers")
     registry = CollectorRegistry()
     with service.database.reading() as session:
-        status = viewing.told_status(service, session)
+        status = viewing.status_document(service, session)
         states = session.execute(select(Submission.state, func.count()).group_by(Submission.state)).all()
     for name in ("waiting", "running", "workers"):
         Gauge(f"dubins_traffic_{name}", f"{name}, see the page of the queue", registry=registry).set(

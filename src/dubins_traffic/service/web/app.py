@@ -36,7 +36,7 @@ from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.queue import StaleLeaseError
 from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.service import Service, Settings
+from dubins_traffic.service.service import Service, ServiceSettings
 from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import api, organisers, pages, worker_api
@@ -60,9 +60,9 @@ class Sessions(ServerSideSessionBackend):
 
     async def load_from_connection(self, connection: ASGIConnection[Any, Any, Any, Any]) -> dict[str, Any]:
         """Return the session of a request, and remember it."""
-        found = await super().load_from_connection(connection)  # pyright: ignore[reportUnknownMemberType]
-        connection.scope["state"][LOADED] = dict(found)
-        return found
+        data = await super().load_from_connection(connection)  # pyright: ignore[reportUnknownMemberType]
+        connection.scope["state"][LOADED] = dict(data)
+        return data
 
     async def store_in_message(
         self, scope_session: Any, message: Message, connection: ASGIConnection[Any, Any, Any, Any]
@@ -155,12 +155,12 @@ def create_app(service: Service) -> Litestar:
     )
 
 
-def _prefix(settings: Settings) -> str:
+def _prefix(settings: ServiceSettings) -> str:
     """Return what cookies are called by that no other host can set; without https there is no such name."""
     return "__Host-" if settings.secure else ""
 
 
-def _middleware(settings: Settings, largest: int) -> list[Any]:
+def _middleware(settings: ServiceSettings, largest: int) -> list[Any]:
     guessing = RateLimitConfig(
         rate_limit=("minute", settings.logins), check_throttle_handler=_is_guess, set_rate_limit_headers=False
     )

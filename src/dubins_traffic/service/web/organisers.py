@@ -13,9 +13,9 @@ from sqlalchemy import select
 
 from dubins_traffic.service import accounts, organising, receiving, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database_tables import Account, Act, Competition, Submission, Team
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Account, Act, Competition, Submission, Team
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.pages import Form, page
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
@@ -113,13 +113,14 @@ class Organisers(Controller):
             row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
             if row is None:
                 raise UnknownError("no such competition")
-            told, places = viewing.told_competition(service, row), viewing.places_of(session)
-            for phase, shown in zip(row.phases, told["phases"], strict=True):
-                found = receiving.submissions_of(session, phase, None)
+            document, places = viewing.competition_document(service, row), viewing.places_of(session)
+            for phase, shown in zip(row.phases, document["phases"], strict=True):
+                its_submissions = receiving.submissions_of(session, phase, None)
                 shown["submissions"] = [
-                    {"row": one, "team": one.team.name, "place": places.get(one.id)} for one in found
+                    {"row": one, "team": one.team.name, "place": places.get(one.id)}
+                    for one in its_submissions
                 ]
-        return page(service, viewer, "organise", f"Organise {told['title']}", competition=told)
+        return page(service, viewer, "organise", f"Organise {document['title']}", competition=document)
 
     @post("/c/{slug:str}/{name:str}/{act:str}", sync_to_thread=True)
     def act(
@@ -135,7 +136,7 @@ class Organisers(Controller):
         if act not in acts:
             raise UnknownError("no such act")
         with service.database.writing() as session:
-            acts[act](service, session, receiving.found_phase(session, slug, name), viewer.person)
+            acts[act](service, session, receiving.phase_named(session, slug, name), viewer.person)
         organising.publish_opened(service)
         return Redirect(f"/desk/c/{slug}", status_code=303)
 
@@ -159,11 +160,11 @@ class Organisers(Controller):
         if act not in acts:
             raise UnknownError("no such act")
         with service.database.writing() as session:
-            found = session.get(Submission, number) if number < 1 << 31 else None
-            if found is None:
+            row = session.get(Submission, number) if number < 1 << 31 else None
+            if row is None:
                 raise UnknownError("no such submission")
-            acts[act](service, session, found, viewer.person, data.get("why", ""))
-            slug = found.phase.competition.slug
+            acts[act](service, session, row, viewer.person, data.get("why", ""))
+            slug = row.phase.competition.slug
         return Redirect(f"/desk/c/{slug}", status_code=303)
 
     @get("/log", sync_to_thread=True)

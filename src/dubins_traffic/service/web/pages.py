@@ -19,11 +19,19 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition import sealing
 from dubins_traffic.service import accounts, receiving, standings, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database_tables import (
+    Account,
+    Competition,
+    Standing,
+    Submission,
+    Team,
+    Token,
+    Trial,
+)
 from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service, competition_of
 from dubins_traffic.service.submissions import RefusedError
-from dubins_traffic.service.tables import Account, Competition, Standing, Submission, Team, Token, Trial
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
 
@@ -65,8 +73,8 @@ class Pages(Controller):
         """Show all competitions."""
         with service.database.reading() as session:
             rows = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
-            told = [viewing.told_competition(service, row) for row in rows]
-        return page(service, viewer, "home", "Competitions", competitions=told)
+            documents = [viewing.competition_document(service, row) for row in rows]
+        return page(service, viewer, "home", "Competitions", competitions=documents)
 
     @get("/c/{slug:str}", sync_to_thread=True)
     def competition(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
@@ -75,8 +83,8 @@ class Pages(Controller):
             row = competition_of(session, slug)
             if row is None:
                 raise NotFoundException("no such competition")
-            told = viewing.told_competition(service, row)
-        return page(service, viewer, "competition", told["title"], competition=told)
+            document = viewing.competition_document(service, row)
+        return page(service, viewer, "competition", document["title"], competition=document)
 
     @get("/c/{slug:str}/{name:str}", sync_to_thread=True)
     def phase(
@@ -85,17 +93,18 @@ class Pages(Controller):
         """Show a phase: rules, limits, the form to submit, the own submissions."""
         at, account = service.clock(), viewer.account
         with service.database.reading() as session:
-            row = receiving.found_phase(session, slug, name)
-            told, own, used = viewing.told_phase(service, row, at), [], None
+            row = receiving.phase_named(session, slug, name)
+            document, mine, used = viewing.phase_document(service, row, at), [], None
             if account is not None and account.team_id is not None:
                 places = viewing.places_of(session)
-                found = receiving.submissions_of(session, row, account.team_id)
-                own = [
-                    viewing.told_submission(service, session, one, None, places, logs=False) for one in found
+                its_submissions = receiving.submissions_of(session, row, account.team_id)
+                mine = [
+                    viewing.submission_document(service, session, one, None, places, logs=False)
+                    for one in its_submissions
                 ]
                 used = submissions.used(session, row, account.team_id, at)
             title = row.competition.title
-        given = {"phase": told, "own": own, "used": used, "slug": slug, "competition": title}
+        given = {"phase": document, "own": mine, "used": used, "slug": slug, "competition": title}
         return page(
             service, viewer, "phase", f"{title}: {name}", largest=service.settings.largest_upload, **given
         )
@@ -107,8 +116,8 @@ class Pages(Controller):
         """Show the leaderboard of a phase and its history."""
         at = service.clock()
         with service.database.reading() as session:
-            row = receiving.found_phase(session, slug, name)
-            phase, told = service.phase(row), viewing.told_phase(service, row, at)
+            row = receiving.phase_named(session, slug, name)
+            phase, document = service.phase(row), viewing.phase_document(service, row, at)
             sees = viewing.sees_table(row, viewer.account, at)
             every: Sequence[Standing] = standings.history(session, row, service.hiding(row)) if sees else ()
             whole = row.is_closed(at) or viewer.organiser
@@ -116,7 +125,7 @@ class Pages(Controller):
                 (one.at, list(one.places) if whole else standings.shown_table(phase, one)) for one in every
             ]
             title = row.competition.title
-        given = {"phase": told, "slug": slug, "competition": title, "sees": sees}
+        given = {"phase": document, "slug": slug, "competition": title, "sees": sees}
         latest = tables[-1] if tables else None
         past = tables[-21:-1][::-1]
         return page(service, viewer, "table", f"{title}: {name}: table", latest=latest, past=past, **given)
@@ -125,7 +134,7 @@ class Pages(Controller):
     def commitment(self, service: ServiceHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
         """Return the published commitment to secret seeds."""
         with service.database.reading() as session:
-            row = receiving.found_phase(session, slug, name)
+            row = receiving.phase_named(session, slug, name)
             if row.commitment is None:
                 raise NotFoundException("no commitment has been published")
             path = sealing.commitment_path(service.phase(row))
@@ -135,7 +144,7 @@ class Pages(Controller):
     def seeds(self, service: ServiceHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
         """Return the revealed seeds."""
         with service.database.reading() as session:
-            row = receiving.found_phase(session, slug, name)
+            row = receiving.phase_named(session, slug, name)
             if row.revealed is None:
                 raise NotFoundException("the seeds are not revealed")
             path = sealing.revealed_path(service.phase(row))
@@ -147,17 +156,17 @@ class Pages(Controller):
     ) -> Template:
         """Show a trial: its score, its log, its replay."""
         with service.database.reading() as session:
-            submission, found = _seen(service, viewer, number, trial, session)
-            own = viewing.owns(viewer.account, submission)
-            row = found.row if own else viewing.shared(found.row)
+            submission, row_of_trial = _seen(service, viewer, number, trial, session)
+            is_owner = viewing.owns(viewer.account, submission)
+            row = row_of_trial.row if is_owner else viewing.shared(row_of_trial.row)
             given = {
                 "submission": submission,
                 "team": submission.team.name,
-                "trial": found,
+                "trial": row_of_trial,
                 "row": row,
                 "phase": submission.phase.name,
                 "slug": submission.phase.competition.slug,
-                "own": own,
+                "own": is_owner,
                 "of": len(service.phase(submission.phase).numbers),
             }
         return page(service, viewer, "trial", f"Trial {trial} of submission {number}", **given)
@@ -168,22 +177,22 @@ class Pages(Controller):
     ) -> Response[bytes]:
         """Return the page that replays a trial, for a frame that may do nothing but draw."""
         with service.database.reading() as session:
-            submission, found = _seen(service, viewer, number, trial, session)
+            submission, row_of_trial = _seen(service, viewer, number, trial, session)
             hiding = service.hiding(submission.phase)
-            digest = viewing.replay_of(found, submission, viewer.account)
+            digest = viewing.replay_of(row_of_trial, submission, viewer.account)
         if digest is None:
             raise NotFoundException("this trial has no replay")
         headers = {"content-encoding": "gzip", "content-security-policy": REPLAY_POLICY}
-        data = hiding.show(service.storage.get(digest, "replays"), replays_of(found))
+        data = hiding.show(service.storage.get(digest, "replays"), replays_of(row_of_trial))
         return Response(data, media_type="text/html; charset=utf-8", headers=headers)
 
     @get("/status", sync_to_thread=True)
     def status(self, service: ServiceHere, viewer: ViewerHere) -> Template:
         """Show the queue and the workers."""
         with service.database.reading() as session:
-            told = viewing.told_status(service, session)
+            document = viewing.status_document(service, session)
             workers = viewing.workers(session) if viewer.organiser else []
-        return page(service, viewer, "status", "Queue and workers", status=told, workers=workers)
+        return page(service, viewer, "status", "Queue and workers", status=document, workers=workers)
 
 
 def _seen(
@@ -195,10 +204,10 @@ def _seen(
         raise UnknownError("no such trial")
     if not viewing.sees_trials(submission.phase, viewer.account, submission, service.clock()):
         raise UnknownError("no such trial")
-    found = viewing.trial_of(service, session, submission, trial)
-    if found is None:
+    row_of_trial = viewing.trial_of(service, session, submission, trial)
+    if row_of_trial is None:
         raise UnknownError("no such trial")
-    return submission, found
+    return submission, row_of_trial
 
 
 @dataclass
@@ -253,12 +262,14 @@ class Submitting(Controller):
 
 def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
     with service.database.reading() as session:
-        found = receiving.found_submission(session, number, viewer.account)
+        submission = receiving.submission_numbered(session, number, viewer.account)
         places = viewing.places_of(session)
-        told = viewing.told_submission(service, session, found, viewer.account, places, logs=False)
-        differing = viewing.differing(service, session, found) if "trials" in told else []
-        closed = found.phase.is_closed(service.clock())
-    return {"submission": told, "differing": differing, "closed": closed}
+        document = viewing.submission_document(
+            service, session, submission, viewer.account, places, logs=False
+        )
+        differing = viewing.differing(service, session, submission) if "trials" in document else []
+        closed = submission.phase.is_closed(service.clock())
+    return {"submission": document, "differing": differing, "closed": closed}
 
 
 Given = URLEncodedBody[Form]
@@ -283,7 +294,7 @@ class Teams(Controller):
             account = session.get_one(Account, viewer.person.id)
             if account.team_id is not None:
                 raise RefusedError("you are in a team already")
-            account.team_id = accounts.found_team(session, data.get("name", ""), service.clock()).id
+            account.team_id = accounts.make_team(session, data.get("name", ""), service.clock()).id
         return Redirect("/team", status_code=303)
 
     @post("/invite", sync_to_thread=True, status_code=200)
@@ -351,7 +362,7 @@ def _sure(session: Session, viewer: Viewer, data: Form) -> Account:
 def _shown(service: Service, viewer: Viewer, code: str = "", token: str = "") -> Template:
     with service.database.reading() as session:
         team = session.get(Team, viewer.person.team_id) if viewer.person.team_id else None
-        members = [own.name for own in team.accounts] if team else []
+        members = [member.name for member in team.accounts] if team else []
         tokens = accounts.tokens(session, viewer.person)
     given = {"team": team, "members": members, "tokens": tokens, "code": code, "token": token}
     return page(service, viewer, "team", "Team and account", url=service.settings.url, **given)

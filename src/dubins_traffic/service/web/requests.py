@@ -16,8 +16,8 @@ from litestar.types import ASGIApp, HTTPReceiveMessage, Receive, Scope, Send
 from litestar.types.asgi_types import WebSocketReceiveMessage
 
 from dubins_traffic.service import accounts
+from dubins_traffic.service.database_tables import Account, Team
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Account, Team
 
 ServiceHere = NamedDependency[Service]
 """The service, as handlers are given it."""
@@ -72,12 +72,12 @@ class Recognition(AbstractAuthenticationMiddleware):
 
 def _by_token(service: Service, token: str) -> Viewer:
     with service.database.reading() as session:
-        found = accounts.token_of(session, token)
-        if found is None:
+        known_token = accounts.token_of(session, token)
+        if known_token is None:
             return Viewer()
-        if found.account_id is None:
+        if known_token.account_id is None:
             return Viewer(worker=True)
-        account = session.get_one(Account, found.account_id)
+        account = session.get_one(Account, known_token.account_id)
         return Viewer(account, account.team)
 
 
@@ -124,8 +124,6 @@ class Bodies:
 
     Parameters
     ----------
-    app : ASGIApp
-        What is asked then.
     largest : int
         Bytes of a file.
     """
@@ -136,10 +134,10 @@ class Bodies:
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         """Hand on a request, of whose body no more than it may have is received."""
         most, come = self._most(scope), 0
-        told = dict(scope["headers"]).get(b"content-length", b"0")
-        if not told.isdigit():
+        length = dict(scope["headers"]).get(b"content-length", b"0")
+        if not length.isdigit():
             raise ClientException("content-length: not a number")
-        if int(told[:20]) > most:
+        if int(length[:20]) > most:
             raise _too_large(most)
 
         async def bounded() -> HTTPReceiveMessage | WebSocketReceiveMessage:

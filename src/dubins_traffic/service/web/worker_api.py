@@ -16,9 +16,9 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.judging import Owner
 from dubins_traffic.service import housekeeping, queue, submissions
+from dubins_traffic.service.database_tables import Chunk, Submission, Worker
 from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.service import Service
-from dubins_traffic.service.tables import Chunk, Submission, Worker
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.requests import ServiceHere
 
@@ -99,10 +99,10 @@ class WorkerApi(Controller):
     @post("/lease", sync_to_thread=True, status_code=HTTP_200_OK)
     def lease(self, service: ServiceHere, data: JSONBody[AskedFor]) -> Response[Leased | None]:
         """Lease the next chunk; nothing if none waits."""
-        found = service.database.patiently(lambda session: _lease(service, session, data.name))
-        if found is None:
+        leased = service.database.patiently(lambda session: _lease(service, session, data.name))
+        if leased is None:
             return Response(None, status_code=HTTP_204_NO_CONTENT)
-        return Response(found)
+        return Response(leased)
 
     @get("/submissions/{digest:str}", sync_to_thread=True)
     def submission(self, service: ServiceHere, digest: Digest) -> Response[bytes]:
@@ -175,9 +175,9 @@ def _keep_replay(service: Service, number: int, data: bytes) -> str:
     return service.storage.put(kept, "replays")
 
 
-def _note(chunk: Chunk, told: str) -> str:
+def _note(chunk: Chunk, why: str) -> str:
     """Return why a lease ended without a result; a phase that does not show all keeps nothing of what a worker saw."""
-    return told if chunk.submission.phase.shows == "all" else f"the log of worker {chunk.worker} says why"
+    return why if chunk.submission.phase.shows == "all" else f"the log of worker {chunk.worker} says why"
 
 
 def _lease(service: Service, session: Session, name: str) -> Leased | None:
@@ -198,7 +198,7 @@ def _lease(service: Service, session: Session, name: str) -> Leased | None:
         digest=submission.digest,
         phase=submission.phase.name,
         competition=dict(service.competition(submission.phase.competition).document),
-        seeds={str(own): seeds[own] for own in chunk.numbers},
+        seeds={str(number): seeds[number] for number in chunk.numbers},
     )
 
 
@@ -209,7 +209,7 @@ def _done(service: Service, session: Session, number: int, report: Report) -> No
     if report.rejected is not None and chunk.kind != "check":
         housekeeping.give_back(session, chunk.id, _note(chunk, report.rejected), at)
     elif chunk.kind != "check":
-        results = [msgspec.to_builtins(own) for own in report.trials or ()]
+        results = [msgspec.to_builtins(trial) for trial in report.trials or ()]
         submissions.record(session, chunk, results, at, service.hiding(submission.phase))
     elif report.rejected is not None:
         queue.finish(session, chunk)
@@ -222,11 +222,11 @@ def _done(service: Service, session: Session, number: int, report: Report) -> No
 
 
 def _seen(session: Session, name: str, at: float, busy: str) -> None:
-    found = session.scalars(select(Worker).where(Worker.name == name)).first()
-    if found is None:
-        found = Worker(name=name)
-        session.add(found)
-    found.seen, found.busy = at, busy
+    row = session.scalars(select(Worker).where(Worker.name == name)).first()
+    if row is None:
+        row = Worker(name=name)
+        session.add(row)
+    row.seen, row.busy = at, busy
 
 
 def _busy(chunk: Chunk) -> str:

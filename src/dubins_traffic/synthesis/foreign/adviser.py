@@ -22,7 +22,7 @@ from dubins_traffic.synthesis.specification import EGO, car_bits, inputs_of, ord
 from dubins_traffic.synthesis.strategy import Advice
 
 
-class Place(NamedTuple):
+class PlayPosition(NamedTuple):
     """A position by number, and the cell of each car, the ego's first."""
 
     position: int
@@ -30,38 +30,30 @@ class Place(NamedTuple):
 
 
 class Labelled:
-    """The game with cars that have names.
-
-    Parameters
-    ----------
-    board : Board
-        The game.
-    moves : MoveList
-        Its moves.
-    """
+    """The game with cars that have names."""
 
     def __init__(self, board: Board, moves: MoveList) -> None:
         self.board = board
         self._moves = moves
-        self._bits = [car_bits(car, board.arena.cells) for car in range(board.others + 1)]
+        self._bits = [car_bits(car, board.road_cells.cells) for car in range(board.others + 1)]
         self._inputs = frozenset(inputs_of(board))
 
-    def letter(self, place: Place) -> Letter:
+    def letter(self, place: PlayPosition) -> Letter:
         """Return what the environment says of a place: the cells of its cars and the order among them."""
-        found = {
+        bits = {
             name: bool(cell >> bit & 1)
             for names, cell in zip(self._bits[1:], place.cells[1:], strict=True)
             for bit, name in enumerate(names)
         }
-        orders = dict.fromkeys((name for name in self._inputs if name not in found), False)
+        orders = dict.fromkeys((name for name in self._inputs if name not in bits), False)
         for first, second in self._before(place):
             if EGO not in (first, second) and first < second:
                 orders[order_name(first, second)] = True
-        return found | {name: value for name, value in orders.items() if name in self._inputs}
+        return bits | {name: value for name, value in orders.items() if name in self._inputs}
 
-    def _before(self, place: Place) -> Iterator[tuple[int, int]]:
+    def _before(self, place: PlayPosition) -> Iterator[tuple[int, int]]:
         """Yield who waits before whom at a crossing."""
-        nodes = self.board.arena.nodes
+        nodes = self.board.road_cells.nodes
         car_in = {cell: car for car, cell in enumerate(place.cells)}
         for node, scene in zip(nodes, self.board.scenes(place.position), strict=True):
             queue = [car_in[len(nodes) + node.inbound[slot]] for slot, _ in scene.queue]
@@ -72,42 +64,44 @@ class Labelled:
         """Return the cell to which an answer sends the ego; propositions that are missing count as false."""
         return sum(answer.get(name, False) << bit for bit, name in enumerate(self._bits[EGO]))
 
-    def moved(self, place: Place, cell: int) -> Place | None:
+    def moved(self, place: PlayPosition, cell: int) -> PlayPosition | None:
         """Return the place after the ego has gone to a cell, None if it may not."""
-        own = place.cells[EGO]
-        if cell == own:
+        cell_now = place.cells[EGO]
+        if cell == cell_now:
             return place
         options = self._moves.of_ego(place.position)[1:]
-        arena, nodes = self.board.arena, len(self.board.arena.nodes)
-        if own < nodes:
-            free = [nodes + lane for lane in arena.nodes[own].exits if nodes + lane not in place.cells]
+        road_cells, nodes = self.board.road_cells, len(self.board.road_cells.nodes)
+        if cell_now < nodes:
+            free = [
+                nodes + lane for lane in road_cells.nodes[cell_now].exits if nodes + lane not in place.cells
+            ]
         else:
-            free = [arena.lane_end[own - nodes][0]]
+            free = [road_cells.lane_end[cell_now - nodes][0]]
         ways = dict(zip(free, options, strict=False))
-        return Place(ways[cell], (cell, *place.cells[1:])) if cell in ways else None
+        return PlayPosition(ways[cell], (cell, *place.cells[1:])) if cell in ways else None
 
-    def turns(self, place: Place) -> Iterator[Place]:
+    def turns(self, place: PlayPosition) -> Iterator[PlayPosition]:
         """Yield the places that the environment may make of one, itself among them."""
         for position in sorted(self._moves.of_others(place.position)):
             if position < self.board.positions:
                 yield from self._named(place, position)
 
-    def _named(self, place: Place, position: int) -> Iterator[Place]:
+    def _named(self, place: PlayPosition, position: int) -> Iterator[PlayPosition]:
         """Yield the ways in which named cars may come to a position."""
         taken = self._taken(position) - {place.cells[EGO]}
         for cells in self._assigned(place.cells[1:], taken):
-            yield Place(position, (place.cells[EGO], *cells))
+            yield PlayPosition(position, (place.cells[EGO], *cells))
 
     def _taken(self, position: int) -> frozenset[int]:
         """Return the cells that are taken in a position."""
-        nodes = self.board.arena.nodes
-        found: set[int] = set()
+        nodes = self.board.road_cells.nodes
+        cells: set[int] = set()
         for number, (node, scene) in enumerate(zip(nodes, self.board.scenes(position), strict=True)):
             if scene.inside is not None:
-                found.add(number)
+                cells.add(number)
             slots = [*(slot for slot, _ in scene.queue), *scene.parked]
-            found |= {len(nodes) + node.inbound[slot] for slot in slots}
-        return frozenset(found)
+            cells |= {len(nodes) + node.inbound[slot] for slot in slots}
+        return frozenset(cells)
 
     def _assigned(self, cells: Sequence[int], taken: frozenset[int]) -> Iterator[tuple[int, ...]]:
         """Yield the cells to which cars may have gone such that they take just these, each one of its own."""
@@ -115,25 +109,25 @@ class Labelled:
             yield ()
             return
         first, *rest = cells
-        for cell in (first, *self.board.arena.following(first)):
+        for cell in (first, *self.board.road_cells.following(first)):
             if cell in taken:
                 for others in self._assigned(rest, taken - {cell}):
                     yield (cell, *others)
 
-    def follows(self, before: Place, after: Place) -> bool:
+    def follows(self, before: PlayPosition, after: PlayPosition) -> bool:
         """Say whether the environment may have made one place of another, whose ego is where it was."""
         if before.cells[EGO] != after.cells[EGO]:
             return False
         steps = zip(before.cells[1:], after.cells[1:], strict=True)
-        near = all(one == other or other in self.board.arena.following(one) for one, other in steps)
+        near = all(one == other or other in self.board.road_cells.following(one) for one, other in steps)
         return near and after.position in self._moves.of_others(before.position)
 
 
 def misfit(board: Board, machine: Machine) -> tuple[str, str] | None:
     """Return a proposition in which a machine and a game differ, and how; None if there is none."""
-    bits = car_bits(EGO, board.arena.cells)
-    own = {*bits, *(order_name(EGO, car) for car in range(1, board.others + 1))}
-    known = own.union(inputs_of(board))
+    bits = car_bits(EGO, board.road_cells.cells)
+    its_inputs = {*bits, *(order_name(EGO, car) for car in range(1, board.others + 1))}
+    known = its_inputs.union(inputs_of(board))
     for name in machine.names:
         if name not in known:
             return name, "a strategy for another problem"
@@ -142,10 +136,10 @@ def misfit(board: Board, machine: Machine) -> tuple[str, str] | None:
             return name, "a strategy for another problem"
     sides = machine.sides or Sides((), ())
     for name in sides.read:
-        if name in own:
+        if name in its_inputs:
             return name, "a strategy that reads what the ego chooses"
     for name in sides.answered:
-        if name not in own:
+        if name not in its_inputs:
             return name, "a strategy that chooses for the others"
     return None
 
@@ -158,8 +152,8 @@ MOST_PLACES: Final = 100_000
 class Turn:
     """The ego's turn: the machine in `state` reads `place`, which the environment has made of `before`."""
 
-    before: Place
-    place: Place
+    before: PlayPosition
+    place: PlayPosition
     state: State
 
 
@@ -168,7 +162,7 @@ class _Answer:
     """What a machine says: its next state, and the place after the ego's move."""
 
     state: State
-    place: Place
+    place: PlayPosition
 
 
 class MachineAdviser:
@@ -176,10 +170,6 @@ class MachineAdviser:
 
     Parameters
     ----------
-    board : Board
-        The game.
-    machine : Machine
-        The strategy.
     fallback : bool
         Whether the ego goes on without the machine where that makes no move of the game.
     """
@@ -192,7 +182,7 @@ class MachineAdviser:
         self._turn: Turn | None = None
         self._begun = False
         self._sure = True
-        self._known: dict[Place, list[State]] = {}
+        self._known: dict[PlayPosition, list[State]] = {}
 
     def wins(self, play: RoadPlay) -> bool:
         """Say whether the machine has an answer where a play is; the errors are those of `advise`."""
@@ -207,10 +197,10 @@ class MachineAdviser:
         DubinsTrafficError if the machine begins elsewhere, or has made no move of the game, and there is no fallback.
         """
         self._follow(play)
-        turn, nodes = self._turn, len(self.board.arena.nodes)
+        turn, nodes = self._turn, len(self.board.road_cells.nodes)
         if turn is None or play.cells[EGO] < nodes or turn.place.cells != tuple(play.cells):
             return None
-        node = self.board.arena.lane_end[play.cells[EGO] - nodes][0]
+        node = self.board.road_cells.lane_end[play.cells[EGO] - nodes][0]
         answer = self._answer(turn.place, turn.state)
         if answer is None or answer.place.cells[EGO] != node:
             return Advice(node, False, ())
@@ -225,7 +215,7 @@ class MachineAdviser:
             return
         if self._game is None:
             self._game = Labelled(self.board, play.moves)
-        place = Place(play.position, tuple(play.cells))
+        place = PlayPosition(play.position, tuple(play.cells))
         if not self._begun:
             self._begun = True
             self._begin(place)
@@ -242,7 +232,7 @@ class MachineAdviser:
                 if self._sure:
                     self._stray(self._wrong_move(turn))
 
-    def _begin(self, place: Place) -> None:
+    def _begin(self, place: PlayPosition) -> None:
         """Let the machine read the first letter, to which it answers with the cell in which the ego starts."""
         first = self._machine.step(self._machine.begin(), self._labelled.letter(place))
         if first is None:
@@ -263,18 +253,18 @@ class MachineAdviser:
     def _stray(self, what: str) -> None:
         """Take note that the machine makes no move of the game."""
         if not self._fallback:
-            told = "with +fallback behind its file, the ego goes on by the rules"
-            raise DubinsTrafficError(f"the strategy {what} ({told})")
+            advice = "with +fallback behind its file, the ego goes on by the rules"
+            raise DubinsTrafficError(f"the strategy {what} ({advice})")
 
     def _wrong_move(self, turn: Turn) -> str:
         """Say what the machine answers in a turn in which that is no move of the game."""
-        found = self._machine.step(turn.state, self._labelled.letter(turn.place))
-        if found is None:
+        step = self._machine.step(turn.state, self._labelled.letter(turn.place))
+        if step is None:
             return f"has no answer where the cars are in cells {turn.place.cells}"
-        way = f"from cell {turn.place.cells[EGO]} to cell {self._labelled.ego_cell(found[1])}"
+        way = f"from cell {turn.place.cells[EGO]} to cell {self._labelled.ego_cell(step[1])}"
         return f"sends the ego {way}, which is no move of the game"
 
-    def _followed(self, place: Place) -> Turn | None:
+    def _followed(self, place: PlayPosition) -> Turn | None:
         """Return the turn at a place to which the play has led by moves of the game, None if there is none."""
         old = self._turn
         if old is None:
@@ -299,23 +289,23 @@ class MachineAdviser:
             now = Turn(now.place, now.place, answer.state)
         return turn
 
-    def _answer_in_time(self, place: Place, state: State) -> _Answer | None:
+    def _answer_in_time(self, place: PlayPosition, state: State) -> _Answer | None:
         """Return the first answer that moves the ego, if nobody else moves; None if it stays for ever."""
         turn = self._waited(Turn(place, place, state))
         answer = self._answer(turn.place, turn.state)
         return None if answer is None or answer.place == place else answer
 
-    def _answer(self, place: Place, state: State) -> _Answer | None:
+    def _answer(self, place: PlayPosition, state: State) -> _Answer | None:
         """Return what the machine answers to a place; None if nothing, or a move that is none of the game."""
-        found = self._machine.step(state, self._labelled.letter(place))
-        if found is None:
+        step = self._machine.step(state, self._labelled.letter(place))
+        if step is None:
             return None
-        after = self._labelled.moved(place, self._labelled.ego_cell(found[1]))
-        return None if after is None else _Answer(found[0], after)
+        after = self._labelled.moved(place, self._labelled.ego_cell(step[1]))
+        return None if after is None else _Answer(step[0], after)
 
-    def _explore(self, place: Place, state: State) -> None:
+    def _explore(self, place: PlayPosition, state: State) -> None:
         """Note in which states the machine may be where, in the plays from a place."""
-        waiting: deque[tuple[Place, State]] = deque([(place, state)])
+        waiting: deque[tuple[PlayPosition, State]] = deque([(place, state)])
         seen = {(place, state)}
         while waiting and len(seen) < MOST_PLACES:
             here, now = waiting.popleft()

@@ -114,8 +114,8 @@ class _Reader:
             raise damaged(WHAT, "a literal of no variable")
         names = self._symbols()
         named = [
-            [(names.get(f"{kind}{k}", f"{kind}{k}"), literal) for k, literal in enumerate(own)]
-            for kind, own in (("i", inputs), ("o", outputs))
+            [(names.get(f"{kind}{k}", f"{kind}{k}"), literal) for k, literal in enumerate(signals)]
+            for kind, signals in (("i", inputs), ("o", outputs))
         ]
         return Circuit(self._most, named[0], named[1], latches, self._ordered(inputs, latches, gates))
 
@@ -129,10 +129,10 @@ class _Reader:
         return [int(word) for word in self._line().split()]
 
     def _latch(self, number: int) -> Latch:
-        found = self._numbers()
-        literal = 2 * (self._inputs + number) + 2 if self._binary else found.pop(0)
-        reset = found[1] if len(found) > 1 else 0
-        return Latch(literal, found[0], reset == 1)
+        numbers = self._numbers()
+        literal = 2 * (self._inputs + number) + 2 if self._binary else numbers.pop(0)
+        reset = numbers[1] if len(numbers) > 1 else 0
+        return Latch(literal, numbers[0], reset == 1)
 
     def _gate(self) -> tuple[int, int, int]:
         gate, left, right = self._numbers()
@@ -144,14 +144,14 @@ class _Reader:
         return gate, left, left - self._delta()
 
     def _delta(self) -> int:
-        found, shift = 0, 0
+        value, shift = 0, 0
         while True:
             byte = self._data[self._place]
             self._place += 1
-            found |= (byte & 127) << shift
+            value |= (byte & 127) << shift
             shift += 7
             if byte < 128:
-                return found
+                return value
             if shift > LONGEST_DELTA:
                 raise ValueError("a number of no variable")
 
@@ -171,7 +171,7 @@ class _Reader:
         """Return the gates such that each comes after those that it depends on."""
         known = {0, *(literal >> 1 for literal in inputs), *(latch.literal >> 1 for latch in latches)}
         by_variable = {gate >> 1: (gate, left, right) for gate, left, right in gates}
-        found: list[tuple[int, int, int]] = []
+        ordered: list[tuple[int, int, int]] = []
         stack = [gate >> 1 for gate, _, _ in reversed(gates)]
         opened: set[int] = set()
         while stack:
@@ -189,6 +189,6 @@ class _Reader:
             if missing:
                 stack += missing
                 continue
-            found.append(gate)
+            ordered.append(gate)
             known.add(variable)
-        return found
+        return ordered

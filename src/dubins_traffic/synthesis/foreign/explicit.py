@@ -112,7 +112,7 @@ def read_tulip(text: str) -> Explicit:
         edges = {state: list(_edges(body, read)) for state, body in _cases(choice)}
     except (SyntaxError, ValueError, KeyError, AssertionError, AttributeError, RecursionError, MemoryError):
         raise damaged(TULIP, "not as tulip.dumpsmach writes it") from None
-    names = dict.fromkeys(name for own in edges.values() for edge in own for name in edge.cube)
+    names = dict.fromkeys(name for out in edges.values() for edge in out for name in edge.cube)
     return Explicit(
         edges, first, list(names), Sides(list(read), [name for name in names if name not in read])
     )

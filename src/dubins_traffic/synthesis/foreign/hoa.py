@@ -41,9 +41,9 @@ def is_hoa(text: str) -> bool:
 
 def read_hoa(text: str) -> Explicit:
     """Return the machine in a text; InputError if it is none, or has labels elsewhere than on its edges."""
-    head, found, rest = text.partition("--BODY--")
+    head, has_body, rest = text.partition("--BODY--")
     body, ended, _ = rest.partition("--END--")
-    if not found or not ended:
+    if not has_body or not ended:
         raise damaged(WHAT, "--BODY-- or --END-- is missing")
     names, start, sides = _header(_tokens(head))
     edges = _Body([token for token in _tokens(body) if not token.startswith(('"', "{"))], names).edges()
@@ -70,15 +70,15 @@ def _header(tokens: list[str]) -> tuple[list[str], int, Sides | None]:
         raise damaged(WHAT, "not one Start: and one AP:")
     if len(start[0]) != 1:
         raise damaged(WHAT, "not one state in which it starts", value=" ".join(start[0][:8]))
-    count, found = _number(names[0], 0), [name.strip('"') for name in names[0][1:]]
-    if len(found) != count or not all(name.startswith('"') for name in names[0][1:]):
+    count, names_of_props = _number(names[0], 0), [name.strip('"') for name in names[0][1:]]
+    if len(names_of_props) != count or not all(name.startswith('"') for name in names[0][1:]):
         raise damaged(WHAT, "AP: with another number of names", value=count)
     if count > MOST_NAMES:
         raise damaged(WHAT, f"more than {MOST_NAMES} propositions", value=count)
     return (
-        found,
+        names_of_props,
         _number(start[0], 0),
-        _sides(found, [own for key, own in items if key == "controllable-AP:"]),
+        _sides(names_of_props, [item for key, item in items if key == "controllable-AP:"]),
     )
 
 
@@ -86,11 +86,11 @@ def _sides(names: list[str], lists: list[list[str]]) -> Sides | None:
     """Return which propositions are read and answered, by the lists of `controllable-AP`."""
     if not lists:
         return None
-    own = {_number(lists[0], place) for place in range(len(lists[0]))}
-    if len(lists) > 1 or any(number >= len(names) for number in own):
+    numbers = {_number(lists[0], place) for place in range(len(lists[0]))}
+    if len(lists) > 1 or any(number >= len(names) for number in numbers):
         raise damaged(WHAT, "not one controllable-AP: of its propositions", value=" ".join(lists[-1][:8]))
-    answered = [names[number] for number in sorted(own)]
-    return Sides([name for number, name in enumerate(names) if number not in own], answered)
+    answered = [names[number] for number in sorted(numbers)]
+    return Sides([name for number, name in enumerate(names) if number not in numbers], answered)
 
 
 def _number(tokens: list[str], place: int) -> int:
@@ -119,8 +119,8 @@ class _Body:
                 state, place = _number(self._tokens, place + 1), place + 2
                 edges.setdefault(state, [])
             elif self._tokens[place] == "[" and state is not None:
-                found, place = self._edges(place + 1)
-                edges[state] += found
+                edges_of_state, place = self._edges(place + 1)
+                edges[state] += edges_of_state
             else:
                 raise damaged(WHAT, "not an edge with a label", value=self._tokens[place])
         return edges
@@ -220,21 +220,21 @@ class _Label:
             inner = self._literal()
             self._depth -= 1
             return lambda wanted: inner(not wanted)
-        found = self._either()
+        cubes = self._either()
         self._take(")")
         self._depth -= 1
-        return found
+        return cubes
 
     def _all(self, parts: list[Callable[[bool], list[_Cube]]], wanted: bool) -> list[_Cube]:
-        found: list[_Cube] = [{}]
+        cubes: list[_Cube] = [{}]
         for part in parts:
-            found = self._work.met(found, part(wanted))
-        return found
+            cubes = self._work.met(cubes, part(wanted))
+        return cubes
 
 
 def _any(parts: list[Callable[[bool], list[_Cube]]], wanted: bool) -> list[_Cube]:
-    found = [cube for part in parts for cube in part(wanted)]
-    return _bounded(found)
+    cubes = [cube for part in parts for cube in part(wanted)]
+    return _bounded(cubes)
 
 
 def _bounded(cubes: list[_Cube]) -> list[_Cube]:

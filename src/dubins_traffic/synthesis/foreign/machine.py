@@ -62,24 +62,16 @@ class Edge:
 
 @dataclass(frozen=True)
 class Explicit:
-    """A machine given by its edges; of several that fit a letter the first is taken.
-
-    Attributes
-    ----------
-    edges : Mapping
-        Of each state.
-    first : State
-        The state before the first letter.
-    names : sequence of str
-        All propositions.
-    sides : Sides or None
-        Which of them it reads and which it answers; None where its file does not say.
-    """
+    """A machine given by its edges; of several that fit a letter the first is taken."""
 
     edges: Mapping[State, Sequence[Edge]]
+    """Of each state."""
     first: State
+    """The state before the first letter."""
     names: Sequence[str]
+    """All propositions."""
     sides: Sides | None = None
+    """Which of them it reads and which it answers; None where its file does not say."""
     _outputs: dict[frozenset[str], list[str]] = field(
         default_factory=dict[frozenset[str], list[str]], init=False, repr=False, compare=False
     )
@@ -99,7 +91,7 @@ class Explicit:
         return None
 
 
-def damaged(what: str, problem: str, *, line: int | None = None, **found: Any) -> InputError:
+def damaged(what: str, problem: str, *, line: int | None = None, **values: Any) -> InputError:
     """Return the error for a file of a strategy that is not as its format says; `value` is what was found there."""
     where = None if line is None else f"line {line}"
-    return InputError(problem, field=where, expected=f"a strategy in {what}", **found)
+    return InputError(problem, field=where, expected=f"a strategy in {what}", **values)

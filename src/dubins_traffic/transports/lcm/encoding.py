@@ -55,15 +55,15 @@ def observation_from_message(message: state_t, problem: Problem) -> Observation:
     """Return the observation, equal to the one that was sent."""
     body = problem.car.body
     generated: Any = message
-    own: car_t = message.own
+    ego: car_t = message.own
     others: list[car_t] = generated.others
     scan: tuple[float, ...] = generated.scan
     return Observation(
         message.tick,
         message.time,
-        _pose(own),
-        Twist(own.speed, own.yaw_rate),
-        _propositions(own),
+        _pose(ego),
+        Twist(ego.speed, ego.yaw_rate),
+        _propositions(ego),
         tuple(
             SensedCar(
                 car.name, car.index, _pose(car), Twist(car.speed, car.yaw_rate), body, _propositions(car)
@@ -75,13 +75,7 @@ def observation_from_message(message: state_t, problem: Problem) -> Observation:
 
 
 class Encoder:
-    """Encodes the messages of every tick of one trial as their classes do, but some times as fast.
-
-    Parameters
-    ----------
-    names : sequence of str
-        Names of the cars.
-    """
+    """Encodes the messages of every tick of one trial as their classes do, but some times as fast."""
 
     def __init__(self, names: Sequence[str]) -> None:
         self._state = state_t().encode()[:FINGERPRINT]

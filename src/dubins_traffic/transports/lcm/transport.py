@@ -134,13 +134,13 @@ class Lcm:
         """Ask whether a session is there already: two would answer each other's drivers."""
         request = mode_t()
         request.sender, request.mode = int.from_bytes(os.urandom(7), "little"), Mode.READY
-        found: list[int] = []
-        self._lcm.subscribe(connection.GRANT, lambda _, data: found.append(grant_t.decode(data).sender))
+        senders: list[int] = []
+        self._lcm.subscribe(connection.GRANT, lambda _, data: senders.append(grant_t.decode(data).sender))
         self._publish(connection.MODE, request.encode())
         until = monotonic() + ANSWER
         while (left := until - monotonic()) > 0.0:
             self.receive(left)
-            if request.sender in found:
+            if request.sender in senders:
                 raise TransportError(
                     f"another session is running at {self.url}: end it, or take another --url"
                 )

@@ -51,8 +51,6 @@ class ExternalWorld:
 
     Parameters
     ----------
-    rospy : module
-        With this process a node.
     ego : bool
         Whether the ego's node sends its commands to the car itself. E-agents of kind `remote` do.
     poses : str, optional

@@ -129,18 +129,18 @@ def load() -> Any:
         If a package of the same name is installed whose messages are not those of 2016.
     """
     add_generated(str(_generated()), packages())
-    found = SimpleNamespace()
+    messages = SimpleNamespace()
     for module, names in _USED.items():
         source = ros(module)
         for name in names.split():
-            setattr(found, name, getattr(source, name))
+            setattr(messages, name, getattr(source, name))
     for kind, expected in MD5.items():
         name = kind.partition("/")[2]
-        if getattr(found, name)._md5sum != expected:
+        if getattr(messages, name)._md5sum != expected:
             raise DubinsTrafficError(
                 f"the installed {kind} is not that of 2016: its md5 sum is not {expected}"
             )
-    return found
+    return messages
 
 
 _USED = {
@@ -179,13 +179,13 @@ def _put(folder: Path, suffix: str, *, overwrite: bool) -> Generator[Path]:
     """Let files be made in the folder given, elsewhere; then write them below `folder`, if none may not be written."""
     with tempfile.TemporaryDirectory() as made:
         yield Path(made)
-        found = sorted(path.relative_to(made) for path in Path(made).rglob(f"*{suffix}"))
-        for name in found:
+        made_files = sorted(path.relative_to(made) for path in Path(made).rglob(f"*{suffix}"))
+        for name in made_files:
             if exists(folder / name):
                 require_output(folder / name, "messages", (suffix,), overwrite=overwrite)
-        for parent in {name.parent for name in found}:
+        for parent in {name.parent for name in made_files}:
             make_folder(folder / parent, "messages")
-        for name in found:
+        for name in made_files:
             replace_file(folder / name, partial(shutil.copyfile, Path(made) / name))
 
 
@@ -236,10 +236,10 @@ def _run(command: Sequence[str]) -> None:
 
 
 def _search_path() -> dict[str, list[str]]:
-    found = {name: [str(DEFINITIONS / name / "msg")] for name in packages()}
+    folders_of = {name: [str(DEFINITIONS / name / "msg")] for name in packages()}
     for name in NEEDED:
         folder = SHARE / name / "msg"
         if not folder.is_dir():
             raise MissingRosError(f"ros-{name.replace('_', '-')}")
-        found[name] = [str(folder)]
-    return found
+        folders_of[name] = [str(folder)]
+    return folders_of

@@ -97,8 +97,6 @@ class Watch:
 
     Parameters
     ----------
-    uri : str
-        The master's.
     look : callable
         Called at every look.
     lost : callable

@@ -22,7 +22,7 @@ from dubins_traffic.transports.maestro import ForeignMaestro, Maestro, Mode
 from dubins_traffic.transports.ros import Stamps, placed
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join, tell_first
-from dubins_traffic.transports.ros1.world import Topics, World
+from dubins_traffic.transports.ros1.world import Ros1Publishers, Topics
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -48,14 +48,8 @@ class MaestroServices:
 
     Parameters
     ----------
-    rospy : module
-        With this process a node.
-    mailbox : Mailbox
-        Where requests go.
     maestro : Maestro, optional
         Who answers mode requests; without one there is no mode service.
-    parameters : SessionParameters
-        The session, for parameters.
     simulated : bool
         Whether the cars are simulated here, so that pausing and placing them is served.
     foreign : ForeignMaestro, optional
@@ -194,8 +188,6 @@ class Ros1:
         The ROS master's.
     maestro : Maestro, optional
         Who grants modes; without one trials start by themselves.
-    parameters : SessionParameters
-        The session, for parameters.
     clock : bool
         Whether `/clock` is published and messages are stamped with simulated time; else with the wall clock's.
     simulated : bool
@@ -229,7 +221,7 @@ class Ros1:
         )
         self._stamps = Stamps(self.interval, clock=clock)
         self._simulated_here, self._foreign = simulated, foreign
-        self._world: World | None = None
+        self._world: Ros1Publishers | None = None
         self._subscribers: dict[str, Any] = {}
         self._there: dict[str, int] = {}
         self._spoke: set[str] = set()
@@ -263,7 +255,9 @@ class Ros1:
         """Put up the topics of the instance's cars, and listen to those that are remote."""
         with self._guarded():
             self._topics.retain(instance.names)
-            self._world = World(self._topics, instance, clock=self._clock, simulated=self._simulated_here)
+            self._world = Ros1Publishers(
+                self._topics, instance, clock=self._clock, simulated=self._simulated_here
+            )
             self._services.describe(instance)
             self._listen(remote)
         self._stamps.begin()

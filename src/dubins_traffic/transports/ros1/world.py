@@ -68,15 +68,13 @@ class Topics:
             self._made.popitem()[1].unregister()
 
 
-class World:
+class Ros1Publishers:
     """Publishes the cars of one instance; only what someone listens to is made.
 
     Parameters
     ----------
     topics : Topics
         Has the publishers, which outlive the instance.
-    instance : Instance
-        Whose cars.
     clock : bool
         Whether `/clock` is published.
     simulated : bool
@@ -172,9 +170,9 @@ class World:
         self._labels.publish(message)
 
     def _put_odometry(self, view: View, time: Any) -> None:
-        told = self._transforms.get_num_connections() > 0
+        listens = self._transforms.get_num_connections() > 0
         for n, car in enumerate(self._cars):
-            if not told and not car.odometry.get_num_connections():
+            if not listens and not car.odometry.get_num_connections():
                 continue
             seen = view.observe(n) if n == 0 else None
             pose = seen.pose if seen is not None else tuple(float(row[0, n]) for row in view.state[:4])
@@ -187,7 +185,7 @@ class World:
             moved = car.transforms[1].transform
             moved.translation.x, moved.translation.y = pose[0], pose[1]
             moved.rotation = message.pose.pose.orientation
-        if told:
+        if listens:
             every = [transform for car in self._cars for transform in car.transforms]
             for transform in every:
                 transform.header.stamp = time

@@ -30,10 +30,7 @@ LAST_DOMAIN = 232
 def usual_domain() -> int:
     """Return the domain that the environment names, 0 without one.
 
-    Raises
-    ------
-    InputError
-        If ``ROS_DOMAIN_ID`` is no number of a domain.
+    InputError if ``ROS_DOMAIN_ID`` is no number of a domain.
     """
     text = os.environ.get("ROS_DOMAIN_ID") or "0"
     if not text.isdecimal() or int(text) > LAST_DOMAIN:

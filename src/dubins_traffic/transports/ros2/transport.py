@@ -20,7 +20,7 @@ from dubins_traffic.transports.maestro import Maestro, Mode, closing_if_refused
 from dubins_traffic.transports.ros import Stamps, placed
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph, usual_domain
-from dubins_traffic.transports.ros2.world import World, moment
+from dubins_traffic.transports.ros2.world import Ros2Publishers, moment
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -50,10 +50,6 @@ class MaestroServices:
 
     Parameters
     ----------
-    graph : Graph
-        Where.
-    mailbox : Mailbox
-        Where requests go.
     maestro : Maestro, optional
         Who answers mode requests; without one there is no mode service.
     """
@@ -176,7 +172,7 @@ class Ros2:
         self._open = True
         with closing_if_refused(self.close):
             self._look_for_others()
-        self._world = World(self._graph, clock=self._clock)
+        self._world = Ros2Publishers(self._graph, clock=self._clock)
         self._services = MaestroServices(self._graph, mailbox, self._maestro)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:

@@ -25,15 +25,13 @@ CLOCK = "rt/clock"
 TRANSFORMS = "rt/tf"
 
 
-class World:
+class Ros2Publishers:
     """Publishes the cars of one instance; only what someone listens to is made.
 
     The writers outlive an instance, so that who listens stays matched.
 
     Parameters
     ----------
-    graph : Graph
-        Where.
     clock : bool
         Whether `/clock` is published.
     """

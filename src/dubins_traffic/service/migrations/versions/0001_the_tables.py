@@ -1,10 +1,10 @@
-"""The tables as `service.tables` states them; the database itself keeps the log of acts from any change but growth."""
+"""The tables as `service.database_tables` states them; the database itself keeps the log of acts from changes."""
 
 from __future__ import annotations
 
 from alembic import op
 
-from dubins_traffic.service.tables import Base
+from dubins_traffic.service.database_tables import Base
 
 revision = "0001"
 down_revision = None

@@ -21,55 +21,37 @@ LARGEST_NODES: Final = 250
 
 @dataclass(frozen=True)
 class Node:
-    """A cell in an intersection.
-
-    Attributes
-    ----------
-    vertex : int
-        The intersection.
-    inbound : tuple of int
-        Lanes that end here; the place of a lane in this tuple is its slot.
-    exits : tuple of int
-        Lanes out.
-    crossing : bool
-        Whether the rules of crossings hold here.
-    """
+    """A cell in an intersection."""
 
     vertex: int
+    """The intersection."""
     inbound: tuple[int, ...]
+    """Lanes that end here; the place of a lane in this tuple is its slot."""
     exits: tuple[int, ...]
+    """Lanes out."""
     crossing: bool
+    """Whether the rules of crossings hold here."""
 
 
 @dataclass(frozen=True)
-class Arena:
-    """The cells of a network: its nodes 0 to V-1, then its lanes V to V+L-1.
-
-    Attributes
-    ----------
-    network : RoadNetwork
-        The roads.
-    order_degree : int
-        Least degree of an intersection that is a crossing.
-    goals : tuple of int
-        Intersections.
-    nodes : tuple of Node
-        In the order of their intersections.
-    """
+class RoadCells:
+    """The cells of a network: its nodes 0 to V-1, then its lanes V to V+L-1."""
 
     network: RoadNetwork
+    """The roads."""
     order_degree: int
+    """Least degree of an intersection that is a crossing."""
     goals: tuple[int, ...]
+    """Intersections."""
     nodes: tuple[Node, ...]
+    """In the order of their intersections."""
 
     @classmethod
-    def of(cls, network: RoadNetwork, goals: Sequence[int], order_degree: int = 1) -> Arena:
+    def of(cls, network: RoadNetwork, goals: Sequence[int], order_degree: int = 1) -> RoadCells:
         """Return the cells of a network.
 
         Parameters
         ----------
-        network : RoadNetwork
-            The roads.
         goals : sequence of int
             Intersections that the ego is to visit; each counts once.
         order_degree : int
@@ -107,10 +89,10 @@ class Arena:
     @cached_property
     def lane_end(self) -> tuple[tuple[int, int], ...]:
         """Node and slot in which each lane ends."""
-        found = {
+        ends = {
             lane: (n, slot) for n, node in enumerate(self.nodes) for slot, lane in enumerate(node.inbound)
         }
-        return tuple(found[lane] for lane in range(self.network.lanes))
+        return tuple(ends[lane] for lane in range(self.network.lanes))
 
     def nodes_of(self, vertex: int) -> tuple[int, ...]:
         """Return the nodes in an intersection."""
