@@ -104,6 +104,16 @@ def ego_tilted(number: int) -> Made:
     )  # fmt: skip
 
 
+def ego_beside_line(number: int) -> Made:
+    """The ego stands in the other lane beside the line of a crossing, as far over the centre line as it may."""
+    stage = Stage(number, TEE)
+    lane = stage.lane_into(3)
+    half = stage.body.radius if isinstance(stage.body, Disc) else 0.5 * stage.body.width
+    far = RADIUS + stage.reach + stage.dice.uniform(-0.1, 0.3)
+    place = stage.pose(lane ^ 1, far, stage.dice.uniform(0.0, 0.049) - half)
+    return _provoked(stage, lane, place, drivers.AsEgo(drivers.Stands()))
+
+
 def ego_slow(number: int) -> Made:
     """The ego keeps the law at a crawl."""
     stage, lane, _ = _bend_stage(number)
@@ -153,6 +163,22 @@ def ego_by_obstacle(number: int) -> Made:
     return _provoked(stage, lane, place, drivers.AsEgo(drivers.Swings(), back=back))
 
 
+def ego_beyond_obstacle(number: int) -> Made:
+    """The ego stands before the disc toward which others pass an obstacle that is near to it."""
+    stage = Stage(number, (ELBOW, None)[number // 3 % 2])
+    lanes = [lane for lane in range(stage.network.lanes) if stage.length(lane) > 3.9]
+    lane = stage.dice.choice(lanes or list(range(stage.network.lanes)))
+    long = 0.0 if isinstance(stage.body, Disc) else stage.body.length
+    radius = stage.dice.uniform(0.08, 0.15)
+    s = stage.length(lane) - RADIUS - long - stage.dice.uniform(0.69, 1.0) - radius
+    stage.block(lane, max(s, RADIUS + 0.85 + radius), radius=radius)
+    others = [own for own in stage.network.arms(stage.end(lane)) if own != lane ^ 1]
+    own = stage.dice.choice(others) ^ 1 if others else lane ^ 1
+    far = RADIUS + stage.reach + stage.dice.uniform(0.1, 1.0)
+    place = stage.pose(own, stage.length(own) - far if others else far)
+    return _provoked(stage, lane, place, drivers.AsEgo(drivers.Stands()), 2)
+
+
 def ego_holds(number: int) -> Made:
     """The ego keeps the law, but holds at every crossing."""
     stage = Stage(number, TEE)
@@ -174,7 +200,7 @@ def ego_whims(number: int) -> Made:
 PROVOKING: Final[Mapping[str, Scene]] = {
     own.__name__: own
     for own in (
-        ego_beyond_exit, ego_beyond_crossing, ego_closes, ego_closes_crossing, ego_tilted, ego_slow, ego_swings,
-        ego_at_edge, ego_in_bend, ego_by_obstacle, ego_holds, ego_whims,
+        ego_beyond_exit, ego_beyond_crossing, ego_closes, ego_closes_crossing, ego_tilted, ego_beside_line, ego_slow,
+        ego_swings, ego_at_edge, ego_in_bend, ego_by_obstacle, ego_beyond_obstacle, ego_holds, ego_whims,
     )
 }  # fmt: skip

@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any
 
+from dubins_traffic.cars.body import Rectangle
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.rules.parameters import RuleParameters
 from tests.rules_reference import Car, Reference
@@ -250,8 +251,12 @@ class Judge:
         here, length = facts["progress"], self.reference.length(lane[0])
         if not self.shut(lane, here, here + reach):
             return False
-        hems = 2.0 * self.problem.car.body.reach + self.rules.overtaking_behind
-        returns = length - self.problem.intersection_radius - hems
+        body = self.problem.car.body
+        long = body.length if isinstance(body, Rectangle) else 0.0
+        room = (1.5 if self.problem.network.bent[lane[0]] else 1.0) * (
+            long + 0.85 * self.rules.overtaking_behind
+        )
+        returns = length - self.problem.intersection_radius - room
         if self.shut(lane, max(here, returns), here + reach):
             self.fired["obstacle by the disc"] += 1
             return True

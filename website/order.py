@@ -12,6 +12,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
         "tutorials/lane-keeper",
         "tutorials/reading-a-verdict",
         "tour",
+        "watch",
         "python",
         "gallery",
     ),

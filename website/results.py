@@ -36,7 +36,8 @@ silent or overran a limit; such a trial is never clean. A trial *came to nothing
 or killed its process. Times are of a wall clock, and depend on the machine; all other numbers are the same
 wherever the suite is run.
 
-`make results` makes the files. The controller `synthesized` is not here, since the games behind most trials are too large for it.
+`make results` makes the files. The controller `synthesized` is not here, since the games behind most trials are
+too large for it.
 """
 
 

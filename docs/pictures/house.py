@@ -1,4 +1,4 @@
-"""Draws the pictures of docs/architecture.md from pyproject: ``python docs/pictures/house.py [FOLDER]``."""
+"""Draws the pictures of docs/architecture.md, one from pyproject: ``python docs/pictures/house.py [FOLDER]``."""
 
 from __future__ import annotations
 
@@ -14,42 +14,14 @@ FAMILIES = {
     "#fbeccb": "task, rules, problem",
     "#ececec": "ground",
 }
-GROUND = {"kernels", "files", "display", "errors", "record", "protocols", "outside"}
-TASK = {"problem", "rules", "logic", "roads", "cars", "synthesis", "scoring"}
-TRIALS = {
-    "engine", "envs", "sandbox", "trial", "simulators", "agents", "controllers", "transports", "shield", "policies",
-    "observations", "routing",
-}  # fmt: skip
-WHAT = {
-    "cli": "one short file a command",
-    "service": "accounts, the queue, pages, workers",
-    "competition": "phases, submissions, places; frozen sets of problems, results",
-    "falsification": "the search for the worst case",
-    "campaign": "many trials and their reports; a check of controllers; bags and logs",
-    "sessions": "drivers or worlds in other processes",
-    "envs": "environments for learning",
-    "engine": "many trials in one compiled pass",
-    "runs": "the work of one command",
-    "viewer": "pictures, replays; records held against what must have happened",
-    "scoring": "metrics and verdicts, from frames",
-    "sandbox": "strangers' controllers, limits, attacks",
-    "trial": "the tick, and the frames of a trial",
-    "simulators": "what stands behind the protocols",
-    "shield": "the nearest command that keeps the rules",
-    "policies": "how cars drive; the game of cells",
-    "observations": "what a driver is told, as a vector too",
-    "routing": "ways through the network",
-    "protocols": "the seams, one file",
-    "record": "one file a trial",
-    "problem": "configurations, instances, how they are drawn",
-    "rules": "propositions, order of arrival, referee",
-    "logic": "formulas and monitors",
-    "roads": "networks; bodies, motion, contact",
-    "kernels": "what compiled functions share",
-    "files": "files whole or not at all; what notebooks show; which version this is",
-    "outside": "classes of the user's own",
-    "errors": "one base class",
+BUILDINGS = {
+    "roof": ("#dbe9f6", "the roof: commands, and what compiles kernels"),
+    "arena": ("#fbeccb", "arena: strangers compete"),
+    "research": ("#e4f1dc", "research: what many trials show"),
+    "bridges": ("#f3e3f1", "bridges: other programs take part"),
+    "core": ("#ececec", "core: a trial and its judgement"),
 }
+"""Colour and caption of each building."""
 
 
 def text(x: float, y: float, words: str, size: int = 13, anchor: str = "middle", colour: str = "#222") -> str:
@@ -84,34 +56,49 @@ def picture(width: int, height: int, title: str, parts: list[str]) -> str:
     return "\n".join([opening, f"<title>{escape(title)}</title>", head, white, *parts, "</svg>"]) + "\n"
 
 
-def layers() -> list[list[str]]:
-    """Return the rooms of each layer that there is, top to bottom, as the contract on imports has them."""
+def buildings() -> dict[str, list[list[str]]]:
+    """Return the rooms of each line of each building, top to bottom, as the contract on imports has them."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    (rooms,) = (one for one in project["tool"]["importlinter"]["contracts"] if one["id"] == "rooms")
-    found = [[room.strip() for room in layer.split("|")] for layer in rooms["layers"]]
-    there = [[room for room in layer if not room.startswith("(")] for layer in found]
-    return [layer for layer in there if layer]
+    (contract,) = project["tool"]["importlinter"]["contracts"]
+    return {name: [line.split(" | ") for line in contract[name]] for name in BUILDINGS}
 
 
-def colour_of(room: str) -> str:
-    """Return the colour of a room's family."""
-    commands, trials, task, ground = FAMILIES
-    return ground if room in GROUND else task if room in TASK else trials if room in TRIALS else commands
+def building(name: str, lines: list[list[str]], x: float, y: float, width: float) -> list[str]:
+    """Draw a building with its rooms, and its caption above them."""
+    colour, caption = BUILDINGS[name]
+    height = 34 + 33 * len(lines)
+    frame = f'x="{x:g}" y="{y:g}" width="{width:g}" height="{height:g}" rx="8"'
+    parts = [
+        f'<rect {frame} fill="{colour}" stroke="#666"/>',
+        text(x + width / 2, y + 19, caption),
+    ]
+    for k, line in enumerate(lines):
+        each = (width - 20 - 8 * (len(line) - 1)) / len(line)
+        for place, room in enumerate(line):
+            parts.append(box(x + 10 + place * (each + 8), y + 28 + 33 * k, each, 26, room, "#fff"))
+    return parts
 
 
 def rooms() -> str:
-    """Draw the rooms in their layers."""
-    parts: list[str] = []
-    for k, layer in enumerate(layers()):
-        y, width = 14 + 33 * k, (468 - 8 * (len(layer) - 1)) / len(layer)
-        for place, room in enumerate(layer):
-            parts.append(box(14 + place * (width + 8), y, width, 26, room, colour_of(room)))
-        parts.append(text(496, y + 17, WHAT.get(layer[0], ""), 12, "start", "#555"))
-    low = 14 + 33 * len(layers()) + 12
-    for place, (colour, words) in enumerate(FAMILIES.items()):
-        parts.append(box(14 + 200 * place, low, 16, 16, "", colour))
-        parts.append(text(36 + 200 * place, low + 13, words, 12, "start"))
-    return picture(930, low + 30, "The rooms of the house; imports only go down", parts)
+    """Draw the buildings: the roof on top, three beside each other, core at the bottom, its lines in two columns."""
+    there = buildings()
+    roof, core = [[room for line in there["roof"] for room in line]], there["core"]
+    pairs = [[*first, *second] for first, second in zip(core[0::2], [*core[1::2], []], strict=False)]
+    parts = building("roof", roof, 14, 14, 1052)
+    widths = {"arena": 240, "research": 500, "bridges": 280}
+    x, deepest = 14.0, 0
+    for name, width in widths.items():
+        parts += building(name, there[name], x, 104, width)
+        x += width + 16
+        deepest = max(deepest, len(there[name]))
+    low = 104 + 34 + 33 * deepest + 40
+    parts += building("core", pairs, 14, low, 1052)
+    for place in (134, 520, 910):
+        parts += [arrow((place, 81), (place, 102)), arrow((place, low - 38), (place, low - 2))]
+    parts += [arrow((254, 190), (268, 190)), arrow((770, 190), (784, 190))]
+    return picture(
+        1080, low + 34 + 33 * len(pairs) + 14, "The buildings and their rooms; imports only go down", parts
+    )
 
 
 def flow() -> str:

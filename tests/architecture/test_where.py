@@ -14,6 +14,8 @@ from tests.architecture.house import PACKAGE, ROOT, modules
 
 PAGE = (ROOT / "docs" / "where.md").read_text(encoding="utf-8")
 RULES = (ROOT / "docs" / "rules.md").read_text(encoding="utf-8")
+TOWN_PAGES = [ROOT / "docs" / "architecture.md", *(ROOT / "docs" / "architecture").glob("*.md")]
+TOWN = "\n".join(path.read_text(encoding="utf-8") for path in TOWN_PAGES)
 HEADINGS = {"ground", "propositions", "1", "2", "3", "E3", "why", "verdicts", "reports"}
 """Anchors of the rules that head others, or say why."""
 CITED = re.compile(r"docs/rules\.md#([\w.-]*\w)")
@@ -78,6 +80,39 @@ def test_each_word_and_each_question_has_a_place_that_is_there() -> None:
     assert len(rows) > 60
     assert len({word for word, _ in rows}) == len(rows)
     assert [(word, place) for word, place in rows if docstring_at(place) is None] == []
+
+
+FOUND_BY_NAMES = 15
+"""So many questions at least lead to their place by the words that they ask for."""
+SMALL_WORDS = {
+    "where",
+    "what",
+    "does",
+    "come",
+    "from",
+    "kept",
+    "made",
+    "that",
+    "above",
+    "looked",
+    "whether",
+    "decided",
+}
+
+
+def leads_to(question: str, place: str) -> bool:
+    """Tell whether a word of a question stands in the place's name, or in its room's row on the pages of the town."""
+    room, *rest = place.split(".")
+    rows = [line for line in TOWN.splitlines() if f"`{room}`" in line[2:].partition(" | ")[0]]
+    text = " ".join([*rows, *rest]).lower().replace("_", " ")
+    words = {word[:5] for word in re.findall(r"[a-z]{4,}", question.lower()) if word not in SMALL_WORDS}
+    return any(word in text for word in words)
+
+
+def test_questions_lead_to_their_places_by_names_and_the_pages_of_the_buildings_alone() -> None:
+    rows = listed("A question")
+    assert sum(leads_to(question, place) for question, place in rows) >= FOUND_BY_NAMES
+    assert not leads_to("Where is the ticket order kept?", "cars.motion")
 
 
 def test_all_words_of_the_glossary_are_listed() -> None:

@@ -31,9 +31,6 @@ FELL = {
 }
 """Trials beyond the first ones in which the bar once did not hold."""
 SECONDS = 300.0 if FULL else None
-BLOCKS = {"before_obstacle": {9}}
-"""Trials in which e-agents that break nothing still block the ego: an obstacle near the disc at the lane's end excuses
-who stands before it, for ever, though there is room to pass it and return."""
 
 
 def _came(name: str) -> list[Came]:
@@ -49,7 +46,7 @@ def _came(name: str) -> list[Came]:
 def test_who_blocks_the_ego_breaks_a_rule(name: str) -> None:
     came = _came(name)
     assert [one for one in came if one.own] == []
-    assert {one.number for one in came if one.waited > one.bound} <= BLOCKS.get(name, set())
+    assert [one for one in came if one.waited > one.bound] == []
 
 
 @pytest.mark.parametrize("name", list(PROVOKING))

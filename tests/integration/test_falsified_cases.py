@@ -5,8 +5,11 @@ from pathlib import Path
 import pytest
 
 from dubins_traffic.falsification.regress import cases_in, outcomes
+from tests.contract_drivers import AsEgo, Stands
 
 CASES = Path(__file__).parents[1] / "cases"
+CONTRACT = CASES / "contract"
+"""What broke the contract once: who blocked `rules`, and who was provoked by an ego that stands."""
 
 
 def test_rules_passes_the_cases_of_its_mutants() -> None:
@@ -17,6 +20,19 @@ def test_the_shield_passes_the_cases_of_lanes() -> None:
     assert [
         own.file.name for own in outcomes(cases_in(CASES / "lanes"), "lanes+shield") if not own.passed
     ] == []
+
+
+def test_rules_gets_past_who_stands_askew_beside_it() -> None:
+    """It waited for good beside a car a few millimetres behind it, which moved while it was being passed."""
+    assert [
+        own.file.name for own in outcomes(cases_in(CONTRACT / "blocked"), "rules") if not own.passed
+    ] == []
+
+
+def test_who_keeps_the_law_goes_up_to_the_line_of_a_crossing_that_is_full() -> None:
+    """It waited so far before it that E5 asked it to come on (`crossing_degree` 1)."""
+    found = list(outcomes(cases_in(CONTRACT / "provoked"), lambda: AsEgo(Stands())))
+    assert [own.file.name for own in found if not own.passed] == []
 
 
 @pytest.mark.parametrize("controller", ["lanes", "simple"])
@@ -30,6 +46,7 @@ def test_a_known_case_is_told_in_the_same_words_again(controller: str) -> None:
 
 
 def test_most_cases_are_small() -> None:
-    cases = [case for folder in CASES.iterdir() for _, case in cases_in(folder)]
+    folders = [folder for folder in CASES.rglob("*") if any(folder.glob("*.json"))]
+    cases = [case for folder in folders for _, case in cases_in(folder)]
     small = [case for case in cases if len(case.instance.starts) <= 3]
     assert len(small) >= 0.8 * len(cases)

@@ -1,4 +1,4 @@
-"""docs/index.md names every page, docs/architecture.md every room as it is, and its pictures are as drawn."""
+"""docs/index.md names every page, docs/architecture.md and its pages every room; its pictures are as drawn."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.architecture.buildings import BUILDINGS, ROOF, town
 from tests.architecture.house import PACKAGE
 
 ROOT = Path(__file__).parents[2]
@@ -47,10 +48,17 @@ def test_the_index_has_five_headings_and_reference() -> None:
     assert headings == ["Start", "The task", "Drive", "Evaluate", "Compete", "Reference"]
 
 
-def test_the_architecture_names_every_room() -> None:
-    table = page("architecture.md").partition("## Rooms")[2].partition("## What may be plugged in")[0]
-    cells = [line.split("|")[1] for line in table.splitlines() if line.startswith("| `")]
-    assert {name for cell in cells for name in re.findall(r"`(\w+)`", cell)} == rooms()
+@pytest.mark.parametrize("building", [name for name in BUILDINGS if name != ROOF])
+def test_the_page_of_a_building_names_its_rooms(building: str) -> None:
+    lines = page(f"architecture/{building}.md").splitlines()
+    cells = [line.split("|")[1] for line in lines if line.startswith("| `")]
+    assert [name for cell in cells for name in re.findall(r"`(\w+)`", cell)] == town().rooms(building)
+    assert f"](architecture/{building}.md)" in page("architecture.md")
+
+
+def test_each_room_has_a_page() -> None:
+    assert {room for name in BUILDINGS for room in town().rooms(name)} == rooms()
+    assert all(f"| `{room}` |" in page("architecture.md") for room in town().rooms(ROOF))
 
 
 def names() -> list[str]:
@@ -75,7 +83,11 @@ def test_a_name_of_the_package_on_a_page_exists(name: str) -> None:
 
 
 def test_the_files_that_the_notes_name_exist() -> None:
-    pages = [DOCS / "architecture.md", *sorted((DOCS / "design").glob("*.md"))]
+    pages = [
+        DOCS / "architecture.md",
+        *(DOCS / "architecture").glob("*.md"),
+        *sorted((DOCS / "design").glob("*.md")),
+    ]
     missing: list[str] = []
     for path in pages:
         for name in re.findall(

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
+from dubins_traffic.cars.body import Body, Car, Disc, DiscObstacle, Rectangle
 from dubins_traffic.roads.network import RoadNetwork
 from tests.judge_reference import Judge
 from tests.judging import (
@@ -409,12 +409,14 @@ def test_e5_an_obstacle_excuses_who_may_lack_room_to_pass_it() -> None:
         far: float = 2.4,
         at: float = 1.6,
         follows: float | None = None,
+        body: Body | None = None,
         **rules: float,
     ) -> list[tuple[object, ...]]:
         trial = case(roads, 2, **{**SOON, **rules})
         places = [on_lane(roads, lane, *place)[:2] for place in ((far, -0.3), *more)]
         obstacles = tuple(DiscObstacle(x, y, 0.1) for x, y in places)
-        problem = replace(trial.problem, obstacles=obstacles)
+        car = replace(trial.problem.car, body=body or trial.problem.car.body)
+        problem = replace(trial.problem, obstacles=obstacles, car=car)
         script = hold(ego, on_lane(roads, lane, at, -0.3), frames=31 if follows is None else 41)
         if follows is not None:
             for k, frame in enumerate(script):
@@ -436,10 +438,11 @@ def test_e5_an_obstacle_excuses_who_may_lack_room_to_pass_it() -> None:
     assert found(on_lane(roads, lane, length - 0.5, -0.3)) == []
     assert found(elsewhere, (4.0, 0.3)) == []
     assert found(elsewhere, (4.75, 0.3)) == late
-    by_the_disc = length - 1.0 - 2.0 * RHO - 0.8
     narrow = {"way_distance": length, "blocked_ahead": 1.5}
-    assert found(elsewhere, far=by_the_disc - 0.1 - EPS, **narrow) == late
-    assert found(elsewhere, far=by_the_disc - 0.1 + EPS, **narrow) == []
+    for long, body in ((0.0, Disc(RHO)), (0.4, Rectangle(0.4, 0.25))):
+        by_the_disc = length - 1.0 - long - 0.85 * 0.8
+        assert found(elsewhere, far=by_the_disc - 0.1 - EPS, body=body, **narrow) == late
+        assert found(elsewhere, far=by_the_disc - 0.1 + EPS, body=body, **narrow) == []
 
 
 @both

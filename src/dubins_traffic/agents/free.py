@@ -55,7 +55,7 @@ NEAR: Final = 1.5
 APART: Final = 0.5
 """A free car does not move toward a body that is nearer than this, metres, of its own accord: the law would then wait
 for that one to go."""
-ASKEW, ALONG = 0.1, 0.99
+ASKEW, ALONG = 0.05, 0.99
 """How far from the middle of its lane, metres, and how far from its direction, a cosine, a body that is no disc still
 moves as it likes: it needs room to turn, which who stands behind it at a line would not leave."""
 SHORT, LONG = 0.2, 5.0

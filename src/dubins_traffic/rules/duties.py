@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from math import sqrt
 from typing import Any
 
 import numpy as np
@@ -18,6 +17,11 @@ from dubins_traffic.rules.exits import ego_at_exit, find_exit, lane_taken, look_
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import GRAIN
 from dubins_traffic.rules.waiting import find_waiting
+
+RETURNS = 0.85
+"""Who passes an obstacle returns before a disc in this share of `overtaking_behind`, and the length of a rectangle."""
+INSIDE = 1.5
+"""The centre line of an arc is at most so many times as long as the middle of a lane on its inside."""
 
 
 @jit_inline
@@ -201,8 +205,10 @@ def _lacks_room(b: int, n: int, place: RightLane, here: float, v: int, tables: R
     needed = own.free_needed + GRAIN
     if not obstacle_narrows(obstacles, place, here, here + way, needed):
         return False
-    returns = place.length - own.radius - sqrt(own.hem2)
-    if obstacle_narrows(obstacles, place, max(here, returns), here + way, needed):
+    room = 2.0 * own.half_length + RETURNS * own.overtaking_behind
+    if tables.roads.segment[int(tables.roads.seg_off[own.net]) + (place.lane >> 1)].piece >= 0:
+        room *= INSIDE
+    if obstacle_narrows(obstacles, place, max(here, place.length - own.radius - room), here + way, needed):
         return True
     left, there = lane_of(tables.roads, own, b, place.lane ^ 1), place.length - here
     if obstacle_narrows(obstacles, left, there - 2.0 * way, there, needed):

@@ -25,12 +25,11 @@ function draw() {
 }
 
 function refresh(force = true) {
-  slider.value = state.time;
-  const words = `${decimals(state.time, 2)} s of ${decimals(trial.last, 2)} s`;
-  slider.setAttribute("aria-valuetext", words);
-  find("clock").textContent = `${decimals(state.time, 2)} / ${decimals(trial.last, 2)} s`;
   const now = performance.now();
   if (force || now - state.panelAt >= PANEL_PERIOD) {
+    slider.value = state.time;
+    slider.setAttribute("aria-valuetext", `${decimals(state.time, 2)} s of ${decimals(trial.last, 2)} s`);
+    find("clock").textContent = `${decimals(state.time, 2)} / ${decimals(trial.last, 2)} s`;
     panel.update(state.time, state.chosen);
     state.panelAt = now;
   }

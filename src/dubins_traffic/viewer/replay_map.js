@@ -40,6 +40,7 @@ class MapView {
     this.context = canvas.getContext("2d");
     this.camera = new Camera();
     this.colours = {};
+    this.layer = { canvas: document.createElement("canvas"), key: "", last: "" };
     this.roads = new Path2D();
     addLines(this.roads, trial.lines);
     this.centres = new Path2D();
@@ -118,17 +119,9 @@ class MapView {
   draw(time, chosen, show) {
     const { context: c, camera, trial } = this;
     if (show.follow) Object.assign(camera, (({ x, y }) => ({ x, y }))(trial.pose(chosen, time)));
-    c.setTransform(1, 0, 0, 1, 0, 0);
-    c.fillStyle = this.colours.ground;
-    c.fillRect(0, 0, this.canvas.width, this.canvas.height);
     this.pixel = 1 / camera.scale;
+    this.drawStanding(time, show);
     this.inMetres();
-    this.drawRoads(show.lanes);
-    this.drawGoals(time);
-    this.inPixels();
-    if (show.labels) this.drawPlaces();
-    this.inMetres();
-    this.drawObstacles();
     if (show.trails) trial.cars.forEach((_, index) => this.drawTrail(trial.cars.length - 1 - index, time));
     if (show.sensing) this.drawSensing(chosen, time);
     drawContacts(this, time, show);
@@ -138,6 +131,34 @@ class MapView {
     if (show.labels) this.drawNames(time, chosen);
     nameBreaches(this, time, show);
     this.drawScale();
+  }
+
+  // All that does not move; it is kept once it has been drawn twice, since a camera that moves would keep it in vain.
+  drawStanding(time, show) {
+    const { context: c, camera, canvas, layer } = this;
+    const { x, y, scale } = camera;
+    const lit = [...this.trial.progress(time).lit].join();
+    const key = [x, y, scale, canvas.width, canvas.height, show.lanes, show.labels, this.colours.ground, lit].join("|");
+    c.setTransform(1, 0, 0, 1, 0, 0);
+    if (key === layer.key) {
+      c.drawImage(layer.canvas, 0, 0);
+      return;
+    }
+    c.fillStyle = this.colours.ground;
+    c.fillRect(0, 0, canvas.width, canvas.height);
+    this.inMetres();
+    this.drawRoads(show.lanes);
+    this.drawGoals(time);
+    this.inPixels();
+    if (show.labels) this.drawPlaces();
+    this.inMetres();
+    this.drawObstacles();
+    if (key === layer.last) {
+      Object.assign(layer.canvas, { width: canvas.width, height: canvas.height });
+      layer.canvas.getContext("2d").drawImage(canvas, 0, 0);
+      layer.key = key;
+    }
+    layer.last = key;
   }
 
   inMetres() {

@@ -22,6 +22,9 @@ SIGHT, WIDE_SIGHT = 3.0, 10.0
 """Distance up to which other bodies matter to a car's next tick: the greater of metres and units of w."""
 
 
+PATIENT = 0.5
+"""An e-agent that has waited for this share of the time that E5 allows dares more: before a bend or dead end it enters
+as soon as an exit is free, even if cars in it may stop; before an obstacle it passes what stands beyond."""
 DAWDLE = 0.12
 """Speed at which a nemesis drives in front of the ego, m/s, where E5 allows it."""
 IN_TIME = 0.9

@@ -5,11 +5,10 @@ from __future__ import annotations
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_in_lane
 from dubins_traffic.policies.rules.passing import (
-    BACK,
     BERTH,
     NARROWS,
     SLIP,
-    drawn_out,
+    back_at,
     passing_time,
     stop_line,
 )
@@ -44,7 +43,7 @@ def is_barred(traffic: Traffic, net: int, lane: int, first: int, last: int, vehi
             return True
         own = begin - vehicle.reach - SLIP
         until = end + SLIP + 2.0 * vehicle.half_length
-        back = until + BACK * drawn_out(tight)
+        back = length + back_at(until - length, tight, vehicle)
         offset += BERTH + wide
         aside = offset > 3.0 * vehicle.middle - EDGE
         if aside or back > length + stop_line(vehicle) or own < vehicle.disc + vehicle.reach + EDGE:

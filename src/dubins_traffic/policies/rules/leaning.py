@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
-from dubins_traffic.policies.rules.seeing import SIDE
+from dubins_traffic.policies.rules.seeing import SIDE, is_by_disc_behind
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath, on_way
 from dubins_traffic.policies.safety import GUARD, travel_of
@@ -27,28 +27,27 @@ def leans(vehicle: Vehicle) -> bool:
 def lean(b: int, n: int, offset: float, way: ReferencePath, near: int, traffic: Traffic) -> float:
     """Return how far left of its way car n drives past the bodies left of it, 0 or less, metres; 0 while it passes.
 
-    `offset` (m) is where it would drive otherwise; `near` (count) cars are listed. Only beside a bend it leans.
+    `offset` (m) is where it would drive otherwise; `near` (count) cars are listed.
     """
     drivers = traffic.drivers
     free = near == 0 or offset != 0.0 or drivers.car[b, n].aside != 0.0
-    free = free or not leans(drivers.vehicle[b]) or not beside_bend(b, n, traffic)
+    free = free or not leans(drivers.vehicle[b]) or not may_lean(b, n, way, traffic)
     return 0.0 if free else away_from(b, way, near, traffic)
 
 
 @jit_rare
-def beside_bend(b: int, n: int, traffic: Traffic) -> bool:
-    """Tell whether car n is in a bend, or between two: a car that turns aside near a crossing may enter it anew."""
+def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
+    """Tell whether a car may turn aside where it is: near the crossing out of which it comes it may enter that anew."""
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
-    first = int(roads.vert_off[drivers.net[b]])
-    least = drivers.vehicle[b].degree
-    disc = int(labels.crosses[b, n])
-    if disc >= 0:
-        return int(roads.degree[first + disc]) < least
-    lane = int(labels.lane[b, n])
-    if lane < 0:
+    vehicle, net = drivers.vehicle[b], drivers.net[b]
+    first = int(roads.vert_off[net])
+    disc, lane = int(labels.crosses[b, n]), int(labels.lane[b, n])
+    if disc >= 0 and int(roads.degree[first + disc]) < vehicle.degree:
+        return True
+    if lane < 0 or (disc >= 0 and disc != lane_end(roads, net, lane)):
         return False
-    begin, end = lane_start(roads, drivers.net[b], lane), lane_end(roads, drivers.net[b], lane)
-    return int(roads.degree[first + begin]) < least and int(roads.degree[first + end]) < least
+    begin = int(roads.degree[first + lane_start(roads, net, lane)])
+    return begin < vehicle.degree or not is_by_disc_behind(b, n, way, traffic)
 
 
 @jit_rare

@@ -9,7 +9,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
-from dubins_traffic.policies.rules.abilities import turns_within_road
+from dubins_traffic.policies.rules.abilities import PATIENT, turns_within_road
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_on_way, within_lane
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
@@ -25,6 +25,9 @@ SLIP = 0.25
 """A car begins to return this far past what it passes, metres, beyond the length of a rectangle."""
 BACK = 0.4
 """Distance from there in which its body is back in the right lane, metres."""
+STRAIGHT = 0.5
+"""Before the end of a road the last metres outside the disc are straight (docs/rules.md#curves): at least so many,
+beyond the reach of a body."""
 TURNING = 1.2
 """Seconds that passing takes in addition to the time for the distance."""
 COMES = 0.7
@@ -85,6 +88,16 @@ def slowed_by(tight: float) -> float:
 
 
 @jit_inline
+def back_at(until: float, tight: float, vehicle: Vehicle) -> float:
+    """Return where a car that begins to return at `until` is back in its lane, metres from the intersection, negative.
+
+    `tight` (ratio) is `Scratch.tight`. On the straight end of a road it needs no more than on a straight road.
+    """
+    straight = max(until, -(vehicle.disc + vehicle.reach + STRAIGHT))
+    return min(until + BACK * drawn_out(tight), straight + BACK)
+
+
+@jit_inline
 def passing_time(own: float, until: float, tight: float, vehicle: Vehicle) -> float:
     """Return how long passing takes at most, seconds, from `own` (m) along the lane to where `until` (m) it returns.
 
@@ -110,7 +123,7 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     line = stop_line(vehicle)
     until = end + SLIP + 2.0 * vehicle.half_length
     tight = scratch.tight[0]
-    back = until + BACK * drawn_out(tight)
+    back = back_at(until, tight, vehicle)
     if end < own or offset > 3.0 * vehicle.middle - EDGE or back > line or not can_come_back(vehicle):
         return
     net = drivers.net[b]
@@ -187,7 +200,11 @@ def keep_off(b: int, n: int, p: int, way: ReferencePath, traffic: Traffic) -> No
 
 @jit
 def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic: Traffic) -> bool:
-    """Tell whether a car may come out of the next disc that is now at most `comes` metres behind it."""
+    """Tell whether a car may come out of the next disc that is now at most `comes` metres behind it.
+
+    An e-agent that has waited for long counts on those that stand before that disc to stand on, since they do not
+    excuse it (docs/rules.md#lacks-room).
+    """
     state, labels, roads, drivers, scratch = (
         traffic.state,
         traffic.labels,
@@ -198,12 +215,16 @@ def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic
     net = drivers.net[b]
     v = lane_end(roads, net, drivers.car[b, n].lane)
     row = int(roads.vert_off[net]) + v
+    vehicle = drivers.vehicle[b]
+    dares = n != EGO and drivers.car[b, n].waited * vehicle.period > PATIENT * vehicle.rest_time
     for k in range(roads.degree[row]):
         j = scratch.head[roads.arms[row, k] >> 1]
         while j >= 0:
             dx = state.x[b, j] - way.x
             dy = state.y[b, j] - way.y
-            if j != n and dx * dx + dy * dy < (comes + 1.0) * (comes + 1.0) and j != who:
+            far = dx * dx + dy * dy >= (comes + 1.0) * (comes + 1.0)
+            stands = labels.bits[b, j] & FLAG.STANDS != 0 and labels.crosses[b, j] < 0
+            if j not in (n, who) and not far and not (dares and stands):
                 inbound = labels.lane[b, j] < 0 or lane_end(roads, net, int(labels.lane[b, j])) == v
                 if inbound and labels.segment[b, j] != drivers.car[b, n].lane >> 1:
                     return True

@@ -277,19 +277,22 @@ def pass_what_stands(
     traffic: Traffic,
 ) -> tuple[float, float]:
     """Return (speed, offset to the left of the way): of a car that drives on the left, or passes, or waits to."""
-    state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
+    state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     bits = np.int64(labels.bits[b, n])
     if outside and (bits & FLAG.BLOCKED != 0 or car.aside != 0.0):
-        watch(b, n, who, state, car, car.lane, scratch)
+        watch(b, n, who, traffic)
     offset = 2.0 * vehicle.middle if car.violations & VIOLATION.LEFT_SIDE != 0 and outside else 0.0
     stubborn = part == PART.THROUGH or who < 0 or bits & FLAG.BLOCKED != 0 or offset != 0.0
     car.waited = car.waited + 1 if stubborn and gap < kept + 0.05 else 0
     if offset != 0.0 and car.waited > ticks_of(STUCK, vehicle):
         car.violations &= ~VIOLATION.LEFT_SIDE
-    idle = car.aside == 0.0 or (within_lane(car.aside, vehicle) and car.waited > ticks_of(STUCK, vehicle))
-    if who < -1 and part == PART.BEFORE and idle and offset == 0.0:
+    stuck = car.aside != 0.0 and within_lane(car.aside, vehicle) and car.waited > ticks_of(STUCK, vehicle)
+    if stuck and outside and car.waited % 4 == 0:
+        find_way_past(b, n, way, who, traffic)
+        stuck = car.waited > 0
+    if who < -1 and part == PART.BEFORE and (stuck or car.aside == 0.0) and offset == 0.0:
         keep_off(b, n, -2 - who, way, traffic)
     if not outside:
         there = part == PART.BEFORE and within_lane(car.aside, vehicle)

@@ -9,6 +9,7 @@ import numpy as np
 
 from dubins_traffic.cars.state import EGO, State
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
+from dubins_traffic.policies.rules.abilities import PATIENT
 from dubins_traffic.policies.rules.choice import (
     is_about_to_enter,
     is_way_on_free,
@@ -34,9 +35,6 @@ BUDGET = 4.0
 DUTY = 0.8
 """An e-agent that has lost its place once enters after this share of the time in which it would lose it again, even
 without room in any exit: otherwise it breaks E3."""
-PATIENT = 0.5
-"""An e-agent that has stood before a bend or dead end for this share of the time that E5 allows enters as soon as an
-exit is free, even if cars in it may stop."""
 HUSH = 0.2
 """For this share of every half of the time in which each goal has to be free once (E6) e-agents enter a bend that is
 a goal one after another."""

@@ -8,7 +8,8 @@ import numpy as np
 
 from dubins_traffic.cars.state import State
 from dubins_traffic.cars.tables import ObstacleTable
-from dubins_traffic.kernels.compile import jit_inline
+from dubins_traffic.kernels.compile import jit_inline, jit_rare
+from dubins_traffic.policies.rules.narrow import EDGE
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Scratch, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_way
 from dubins_traffic.roads.lookup import lane_end, lane_start
@@ -229,6 +230,17 @@ def see_obstacles(
     return gap, who, close
 
 
+@jit_rare
+def is_by_disc_behind(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
+    """Tell whether a car is still so near to the disc at the beginning of its lane that it can't pull out."""
+    drivers = traffic.drivers
+    vehicle = drivers.vehicle[b]
+    lane = drivers.car[b, n].lane
+    length = traffic.roads.segment[int(traffic.roads.seg_off[drivers.net[b]]) + (lane >> 1)].length
+    gone = length + way_to_go(way, traffic.state.x[b, n], traffic.state.y[b, n])
+    return gone < vehicle.disc + vehicle.reach + EDGE + AWARE
+
+
 @jit_inline
 def wanted_gap(
     b: int, n: int, who: int, way: ReferencePath, traffic: Traffic, car: Driver, part: int, reach: float
@@ -241,7 +253,8 @@ def wanted_gap(
     if labels.bits[b, n] & FLAG.LEFT != 0:
         standing = QUEUE_GAP
     if who < -1:
-        return OBSTACLE_GAP if labels.crosses[b, n] >= 0 else standing
+        near = labels.crosses[b, n] >= 0 or is_by_disc_behind(b, n, way, traffic)
+        return OBSTACLE_GAP if near else standing
     if car.violations & VIOLATION.TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])
@@ -252,6 +265,11 @@ def wanted_gap(
         return FACING_GAP if labels.bits[b, n] & FLAG.LEFT == 0 else MOVING_GAP
     in_disc = labels.crosses[b, n] >= 0
     waits = its & FLAG.EXCUSED != 0 or its & FLAG.APPROACH != 0
+    if part == PART.BEFORE and labels.lane[b, who] != car.lane:
+        v = lane_end(traffic.roads, traffic.drivers.net[b], car.lane)
+        waits = (
+            waits or labels.crosses[b, who] == v
+        )  # nobody is passed there: the line keeps a car far enough
     if in_disc or waits:
         return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 or in_disc else MOVING_GAP
     if its & FLAG.STANDS != 0 or (car.kind == KIND.ROUND and part == PART.BEFORE):

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-from dubins_traffic.cars.state import State
 from dubins_traffic.kernels.compile import jit, jit_rare
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.passing import along, aside
-from dubins_traffic.policies.rules.tables import Driver, Scratch, Traffic
+from dubins_traffic.policies.rules.tables import Traffic
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
+from dubins_traffic.policies.safety import GUARD, travel_of
+from dubins_traffic.roads.lookup import INFINITE
 from dubins_traffic.rules.blocking import narrows
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import half_across, half_extent
 
 LINE, SURE = 0.002, 0.03
 """Distance of the body from where it counts as left, and of what it passes from where that ends, metres."""
+AHEAD = 1.0
+"""What is farther ahead than this, beyond the bodies, does not keep a car from driving on in its lane, metres."""
 
 
 @jit
@@ -70,16 +73,49 @@ def surely_stands(b: int, n: int, own: float, way: ReferencePath, traffic: Traff
 
 
 @jit_rare
-def watch(
-    b: int, n: int, who: int, state: State, car: Driver, lane: int, scratch: Scratch
-) -> None:  # fmt: skip
-    """Count for how long the car that may be passed has not moved: car `who`, or the one watched so far."""
-    j = scratch.head[lane >> 1]
+def may_drive_on(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
+    """Tell whether nothing is close ahead of a car where it is in its lane, so that it can pass what is beside it."""
+    state, obstacles, drivers, scratch = traffic.state, traffic.obstacles, traffic.drivers, traffic.scratch
+    vehicle = drivers.vehicle[b]
+    own, left = along(way, state.x[b, n], state.y[b, n]), aside(way, state.x[b, n], state.y[b, n])
+    wide = half_across(b, n, way.tx, way.ty, state, vehicle) + travel_of(vehicle) + GUARD
+    far = 2.0 * vehicle.reach + AHEAD
+    j = scratch.head[drivers.car[b, n].lane >> 1]
+    while j >= 0:
+        key, its = (
+            along(way, float(state.x[b, j]), float(state.y[b, j])),
+            aside(way, float(state.x[b, j]), float(state.y[b, j])),
+        )
+        half = half_across(b, j, way.tx, way.ty, state, vehicle)
+        if j != n and own < key < own + far and abs(its - left) < wide + half:
+            return False
+        j = scratch.link[j]
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        part = obstacles.parts[p]
+        key, its = along(way, part.x, part.y), aside(way, part.x, part.y)
+        if own < key < own + far + part.reach and abs(its - left) < wide + part.reach:
+            return False
+    return True
+
+
+@jit_rare
+def watch(b: int, n: int, who: int, traffic: Traffic) -> None:
+    """Count for how long the car that may be passed has not moved: car `who`, the one watched so far, or one beside."""
+    state, labels, car = traffic.state, traffic.labels, traffic.drivers.car[b, n]
+    scratch, segment = traffic.scratch, car.lane >> 1
+    j = scratch.head[segment]
     while j >= 0:
         if j != n and state.x[b, j] == car.watch_x and state.y[b, j] == car.watch_y:
             car.watched += 1
             return
         j = scratch.link[j]
     car.watched = 0
+    nearest2 = INFINITE
+    j = scratch.head[segment] if who < 0 else -1
+    while j >= 0:
+        dx, dy = state.x[b, j] - state.x[b, n], state.y[b, j] - state.y[b, n]
+        if j != n and labels.bits[b, j] & FLAG.STANDS != 0 and dx * dx + dy * dy < nearest2:
+            nearest2, who = dx * dx + dy * dy, j
+        j = scratch.link[j]
     if who >= 0:
         car.watch_x, car.watch_y = state.x[b, who], state.y[b, who]

@@ -13,7 +13,7 @@ from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import along
 from dubins_traffic.policies.rules.returning import NARROWLY, last_return
-from dubins_traffic.policies.rules.standing import stays_right
+from dubins_traffic.policies.rules.standing import may_drive_on, stays_right
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.policies.safety import may_hit, may_meet
@@ -139,7 +139,10 @@ def heading(line: Line, most: float) -> tuple[float, float]:
 def keep_right(
     b: int, n: int, speed: float, yaw_rate: float, outside: bool, way: ReferencePath, traffic: Traffic
 ) -> tuple[float, float]:
-    """Return a command that does not make the car left unless it overtakes: otherwise it waits or backs up."""
+    """Return a command that does not make the car left unless it overtakes: otherwise it drives on, waits or backs up.
+
+    It drives on along its lane where nothing is ahead, past who stands beside it and may drive off.
+    """
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
@@ -153,6 +156,13 @@ def keep_right(
     ):
         return speed, yaw_rate
     leans = way.tx * state.s[b, n] - way.ty * state.c[b, n] > 0.0
+    if drivers.car[b, n].aside != 0.0 and bits & FLAG.OVERTAKING != 0 and may_drive_on(b, n, way, traffic):
+        on = steer(
+            state.c[b, n], state.s[b, n], 0.0, way.tx, way.ty, 0.0, speed, SLANT, ALIGNED, vehicle.yaw_most,
+            vehicle.tightest, vehicle.period,
+        )  # fmt: skip
+        if stays_right(b, n, on[0], on[1], way, traffic):
+            return on
     if drivers.car[b, n].aside != 0.0 or not leans or vehicle.slowest >= 0.0:
         return 0.0, 0.0
     speed = min(speed, -vehicle.slowest)
