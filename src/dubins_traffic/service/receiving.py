@@ -10,13 +10,21 @@ from sqlalchemy.orm import Session
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service import submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
-from dubins_traffic.service.database_tables import Account, Phase, Submission
-from dubins_traffic.service.service import Service, phase_of
+from dubins_traffic.service.database_tables import Account, Competition, Phase, Submission
+from dubins_traffic.service.service import Service, competition_of, phase_of
 from dubins_traffic.service.submissions import RefusedError, Upload
 
 
 class UnknownError(DubinsTrafficError):
     """There is no such thing, or not for who asks."""
+
+
+def competition_named(session: Session, slug: str) -> Competition:
+    """Return a competition; UnknownError if there is none."""
+    competition = competition_of(session, slug)
+    if competition is None:
+        raise UnknownError("no such competition")
+    return competition
 
 
 def phase_named(session: Session, slug: str, name: str) -> Phase:

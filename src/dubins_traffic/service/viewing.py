@@ -10,7 +10,7 @@ from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.visibility import SubmissionState, visible
-from dubins_traffic.service import queue, standings, submissions
+from dubins_traffic.service import standings, submissions
 from dubins_traffic.service.database_tables import (
     Account,
     Chunk,
@@ -171,11 +171,6 @@ def status_document(service: Service, session: Session) -> dict[str, Any]:
         "workers": alive,
         "teams_waiting": len(set(session.scalars(select(Chunk.team_id).where(Chunk.state == "waiting")))),
     }
-
-
-def places_of(session: Session) -> Mapping[int, int]:
-    """Return the places in the queue, by submission."""
-    return queue.places(session)
 
 
 def workers(session: Session) -> list[Worker]:

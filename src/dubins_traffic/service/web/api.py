@@ -12,10 +12,9 @@ from litestar.params import MultipartBody, PathParameter
 from prometheus_client import CollectorRegistry, Gauge, generate_latest
 from sqlalchemy import func, select
 
-from dubins_traffic.service import receiving, standings, viewing
+from dubins_traffic.service import queue, receiving, standings, viewing
 from dubins_traffic.service.database_tables import Competition, Submission
-from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.service import Service, competition_of
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
 
@@ -53,13 +52,13 @@ class Api(Controller):
     def competition(self, service: ServiceHere, slug: Name) -> dict[str, Any]:
         """Return a competition and its phases."""
         with service.database.reading() as session:
-            return viewing.competition_document(service, _found(session, slug))
+            return viewing.competition_document(service, receiving.competition_named(session, slug))
 
     @get("/competitions/{slug:str}/file", sync_to_thread=True)
     def file(self, service: ServiceHere, slug: Name) -> dict[str, Any]:
         """Return the competition file with its configurations written in, so that it can be evaluated at home."""
         with service.database.reading() as session:
-            return dict(service.competition(_found(session, slug)).document)
+            return dict(service.competition(receiving.competition_named(session, slug)).document)
 
     @get("/competitions/{slug:str}/phases/{name:str}/table", sync_to_thread=True)
     def table(self, service: ServiceHere, viewer: ViewerHere, slug: Name, name: Name) -> list[dict[str, Any]]:
@@ -96,7 +95,7 @@ class Api(Controller):
             row = receiving.phase_named(session, slug, name)
             if viewer.person.team_id is None:
                 return []
-            places = viewing.places_of(session)
+            places = queue.places(session)
             its_submissions = receiving.submissions_of(session, row, viewer.person.team_id)
             return [
                 viewing.submission_document(service, session, one, viewer.person, places)
@@ -150,18 +149,11 @@ class Api(Controller):
         return {"log": submission.get("log", "")}
 
 
-def _found(session: viewing.Session, slug: str) -> Competition:
-    row = competition_of(session, slug)
-    if row is None:
-        raise UnknownError("no such competition")
-    return row
-
-
 def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
     with service.database.reading() as session:
         submission = receiving.submission_numbered(session, number, viewer.account)
         return viewing.submission_document(
-            service, session, submission, viewer.account, viewing.places_of(session)
+            service, session, submission, viewer.account, queue.places(session)
         )
 
 

@@ -11,7 +11,7 @@ from litestar.params import FromPath, MultipartBody, URLEncodedBody
 from litestar.response import Redirect, Template
 from sqlalchemy import select
 
-from dubins_traffic.service import accounts, organising, receiving, viewing
+from dubins_traffic.service import accounts, organising, queue, receiving, viewing
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.database_tables import Account, Act, Competition, Submission, Team
 from dubins_traffic.service.receiving import UnknownError
@@ -110,10 +110,8 @@ class Organisers(Controller):
     def competition(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
         """Show the phases of a competition and all its submissions."""
         with service.database.reading() as session:
-            row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
-            if row is None:
-                raise UnknownError("no such competition")
-            document, places = viewing.competition_document(service, row), viewing.places_of(session)
+            row = receiving.competition_named(session, slug)
+            document, places = viewing.competition_document(service, row), queue.places(session)
             for phase, shown in zip(row.phases, document["phases"], strict=True):
                 its_submissions = receiving.submissions_of(session, phase, None)
                 shown["submissions"] = [
@@ -144,9 +142,7 @@ class Organisers(Controller):
     def export(self, service: ServiceHere, slug: FromPath[str]) -> Response[bytes]:
         """Return all that is needed to run the competition again."""
         with service.database.reading() as session:
-            row = session.scalars(select(Competition).where(Competition.slug == slug)).first()
-            if row is None:
-                raise UnknownError("no such competition")
+            row = receiving.competition_named(session, slug)
             data = organising.export(service, session, row)
         headers = {"content-disposition": f'attachment; filename="{slug}.zip"'}
         return Response(data, media_type="application/zip", headers=headers)

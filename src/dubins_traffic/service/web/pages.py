@@ -17,7 +17,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.competition import sealing
-from dubins_traffic.service import accounts, receiving, standings, submissions, viewing
+from dubins_traffic.service import accounts, queue, receiving, standings, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.database_tables import (
     Account,
@@ -30,7 +30,7 @@ from dubins_traffic.service.database_tables import (
 )
 from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.service import Service, competition_of
+from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
@@ -80,10 +80,7 @@ class Pages(Controller):
     def competition(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
         """Show a competition and its phases."""
         with service.database.reading() as session:
-            row = competition_of(session, slug)
-            if row is None:
-                raise NotFoundException("no such competition")
-            document = viewing.competition_document(service, row)
+            document = viewing.competition_document(service, receiving.competition_named(session, slug))
         return page(service, viewer, "competition", document["title"], competition=document)
 
     @get("/c/{slug:str}/{name:str}", sync_to_thread=True)
@@ -96,7 +93,7 @@ class Pages(Controller):
             row = receiving.phase_named(session, slug, name)
             document, mine, used = viewing.phase_document(service, row, at), [], None
             if account is not None and account.team_id is not None:
-                places = viewing.places_of(session)
+                places = queue.places(session)
                 its_submissions = receiving.submissions_of(session, row, account.team_id)
                 mine = [
                     viewing.submission_document(service, session, one, None, places, logs=False)
@@ -263,7 +260,7 @@ class Submitting(Controller):
 def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
     with service.database.reading() as session:
         submission = receiving.submission_numbered(session, number, viewer.account)
-        places = viewing.places_of(session)
+        places = queue.places(session)
         document = viewing.submission_document(
             service, session, submission, viewer.account, places, logs=False
         )
