@@ -68,9 +68,9 @@ def measure() -> list[Row]:
 
 def _minute() -> list[Row]:
     """Return the rows of a GIF of a minute; Pillow is given the same pictures, and ours is timed with painting them."""
-    from dubins_traffic.animation.animate import FPS, animate
     from PIL import Image
 
+    from dubins_traffic.animation.animate import FPS, animate
     from dubins_traffic.record.reader import read
     from dubins_traffic.runs.single import run_trial
 

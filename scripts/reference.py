@@ -12,12 +12,12 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from dubins_traffic.cli import catalogue
+from dubins_traffic.cli.catalogue import Parameter
 from dubins_traffic.competition.competition import CompetitionModel, LimitsTable, PhaseModel, Quota, Ranking
 from dubins_traffic.competition.submission import Manifest
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import read_text, write_text
-from dubins_traffic.runs import catalogue
-from dubins_traffic.runs.catalogue import Parameter
 
 _PART = re.compile(r"(<!-- generated: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 """A part of a page between two marks."""

@@ -20,6 +20,7 @@ MOST_RETURNS = 3
 """So many pairs of rooms may there be of which the lower one calls the higher one."""
 REASONS = {
     "agents": ("drive the e-agents", "fleet free kernel lawful tables"),
+    "campaign": ("says what many trials say together", "notice"),
     "cars": (
         "have bodies that move, touch and see",
         "body clip_and_move motion near propositions read_only sensing state tables touching",
@@ -43,13 +44,13 @@ REASONS = {
     "routing": ("finds rounds through the goals", "lane_graph rounds tours"),
     "rules": (
         "label frames and find breaches",
-        "breach_log exits frame judged label_cache labeller location obstacles parameters referee "
+        "breach_log exits explained frame judged label_cache labeller location obstacles parameters referee "
         "referee_kernel shape tables visits",
     ),
     "runs": ("carries a plan out", "jobs plan processes"),
     "scoring": (
         "counts and says what it means",
-        "counts long_enough margins notice own_metrics registry score tally verdict",
+        "counts long_enough margins own_metrics registry score tally verdict",
     ),
     "sessions": ("names the transports of the command's help", "registry"),
     "shield": ("has no car to guard", "tables"),
@@ -72,12 +73,14 @@ def done(call: str) -> dict[str, Any]:
     return json.loads(told.stdout)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("call", sorted(CALLS))
 def test_few_rooms_call_a_higher_one(call: str) -> None:
     returns = done(call)["returns"]
     assert len(returns) <= MOST_RETURNS, returns
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("call", sorted(CALLS))
 def test_no_room_is_entered_for_two_reasons(call: str) -> None:
     modules = done(call)["modules"]
@@ -87,6 +90,7 @@ def test_no_room_is_entered_for_two_reasons(call: str) -> None:
     assert {room: names for room, names in others.items() if names} == {}
 
 
+@pytest.mark.long
 def test_a_trial_and_a_batch_stay_in_core() -> None:
     for call in ("run_batch", "run_trial"):
         assert {town().building[room] for room in done(call)["modules"]} == {CORE}

@@ -18,10 +18,10 @@ from pyarrow import parquet
 
 import dubins_traffic as dt
 from dubins_traffic.cli.main import main as command_line
+from dubins_traffic.interchange.export import export
 from dubins_traffic.logic.formula import FormulaError
 from dubins_traffic.problem import document as documents
 from dubins_traffic.problem import draw as drawing
-from dubins_traffic.record.export import export
 from dubins_traffic.specifications.exports import FORMATS
 from dubins_traffic.specifications.task import task
 from dubins_traffic.synthesis.answer import answer

@@ -21,6 +21,7 @@ from selenium import webdriver
 from selenium.webdriver.common.by import By
 
 from dubins_traffic.campaign import manifest
+from dubins_traffic.campaign.columns import REPORTED, SCORES
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.conclusion import conclusion
 from dubins_traffic.campaign.report.latex import latex_table
@@ -29,7 +30,6 @@ from dubins_traffic.campaign.results import load_results
 from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
-from dubins_traffic.scoring.columns import REPORTED, SCORES
 from tests.browser import browsing, dark, faults, widen
 from tests.campaigns import campaign, written
 

@@ -11,12 +11,12 @@ from typing import Any
 import pytest
 from scripts.reference import renewed
 
+from dubins_traffic.cli import catalogue
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import shipped_names
 from dubins_traffic.problem.kinds import KINDS
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.runs import catalogue
 
 pytestmark = pytest.mark.path
 

@@ -19,9 +19,9 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.files import require_output
 from dubins_traffic.gazebo.world import write_sdf
 from dubins_traffic.interchange.bags import write_bag
+from dubins_traffic.interchange.export import export
 from dubins_traffic.learning.policy import Policy
 from dubins_traffic.problem.files import write_document
-from dubins_traffic.record.export import export
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.single import run_trial
 from tests.recordings import make_instance

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 
 from dubins_traffic.cars.body import Disc, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.cars.state import Frames
+from dubins_traffic.interchange.export import COLUMNS, export
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.protocols import End, Ending
-from dubins_traffic.record.export import COLUMNS, export
 from dubins_traffic.record.reader import from_bytes, read
 from dubins_traffic.record.writer import RecordWriter
 from dubins_traffic.scoring.score import Scorer, score

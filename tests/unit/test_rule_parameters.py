@@ -13,10 +13,10 @@ from dubins_traffic.problem.document import instance_from_document, instance_to_
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.record.header import decode, encode
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.rules.labels import words
 from dubins_traffic.rules.parameters import EDITION, RuleParameters
 from dubins_traffic.rules.propositions import NAMES, names
 from dubins_traffic.rules.tables import ticks
+from dubins_traffic.transports.labels import words
 
 
 def test_defaults_are_those_of_the_rules() -> None:

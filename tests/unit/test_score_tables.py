@@ -12,6 +12,7 @@ from rich.console import Console
 
 from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.notice import assumption_notice
 from dubins_traffic.campaign.report import terminal, worst
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.write import page
@@ -22,7 +23,6 @@ from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.collisions import Collision
 from dubins_traffic.scoring.duration import ran_whole
-from dubins_traffic.scoring.notice import assumption_notice
 from dubins_traffic.scoring.paper import network_size, paper_score
 from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet
 from dubins_traffic.scoring.verdict import Excuse, Place, Ruling, Verdict, Violation, is_clean, was_cut

@@ -331,7 +331,7 @@ def test_the_sheet_sums_the_scores() -> None:
 
 
 def test_scoring_a_record_does_not_load_the_compiler() -> None:
-    code = "import sys, dubins_traffic.scoring.score, dubins_traffic.record.export; print(*sys.modules)"
+    code = "import sys, dubins_traffic.scoring.score, dubins_traffic.interchange.export; print(*sys.modules)"
     loaded = subprocess.run(
         [sys.executable, "-c", code], check=True, capture_output=True, text=True
     ).stdout.split()

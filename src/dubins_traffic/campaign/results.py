@@ -11,11 +11,11 @@ from typing import Any
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import manifest, table
 from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.columns import SCORES
 from dubins_traffic.display import pandas
 from dubins_traffic.engine.batch import Batch
 from dubins_traffic.errors import InputError
 from dubins_traffic.runs.single import Result
-from dubins_traffic.scoring.columns import SCORES
 from dubins_traffic.scoring.score import Score, ScoreSheet, outcome
 from dubins_traffic.viewer.notebook import shares_html
 

@@ -7,9 +7,9 @@ from importlib import import_module
 from io import BytesIO
 from typing import Any, TypeAlias
 
+from dubins_traffic.campaign.columns import SCORES
 from dubins_traffic.errors import MissingExtraError
 from dubins_traffic.record.sink import Ending
-from dubins_traffic.scoring.columns import SCORES
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.score import Score
 

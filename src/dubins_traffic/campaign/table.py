@@ -13,12 +13,12 @@ import numpy as np
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.chunks import Cell
+from dubins_traffic.campaign.notice import fault_notice
 from dubins_traffic.controllers.registry import ran
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.scoring.metric import Column
-from dubins_traffic.scoring.notice import fault_notice
 
 RESULTS = "results.parquet"
 WALL = "wall.parquet"

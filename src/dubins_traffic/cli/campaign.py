@@ -109,8 +109,8 @@ def run(
 
 def _conclude(ran: Ran) -> None:
     """Say what there is, and fail if a trial came to nothing."""
+    from dubins_traffic.campaign.notice import assumption_notice
     from dubins_traffic.campaign.table import RESULTS, assumption, faulty
-    from dubins_traffic.scoring.notice import assumption_notice
 
     before = f", {ran.before} of them before" if ran.before else ""
     print(f"{ran.folder / RESULTS}: {ran.campaign.total} trials{before}")
@@ -155,8 +155,8 @@ def _print(written: Written, folder: str, *, everything: bool) -> None:
     """Print a report: in at most 30 lines, or everything."""
     from rich.console import Console
 
+    from dubins_traffic.campaign.notice import assumption_notice
     from dubins_traffic.campaign.report import terminal
-    from dubins_traffic.scoring.notice import assumption_notice
 
     console = Console(highlight=False)
     for part in terminal.short_tables(written.comparison):

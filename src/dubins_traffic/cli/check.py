@@ -32,8 +32,8 @@ def check(
 
     Labels and contacts are found again from poses and commands, whatever the records say of them.
     """
+    from dubins_traffic.campaign.notice import assumption_notice
     from dubins_traffic.runs.sources import load_record
-    from dubins_traffic.scoring.notice import assumption_notice
     from dubins_traffic.scoring.score import ScoreSheet, score
     from dubins_traffic.verification.worlds import from_poses
 

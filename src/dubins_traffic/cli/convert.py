@@ -71,9 +71,9 @@ def convert(
     from dubins_traffic.files import is_stream
     from dubins_traffic.gazebo.world import Version, write_sdf
     from dubins_traffic.interchange.bags import is_bag, write_bag
+    from dubins_traffic.interchange.export import export
     from dubins_traffic.interchange.lcm_log import is_log
     from dubins_traffic.problem.instance import Instance
-    from dubins_traffic.record.export import export
     from dubins_traffic.record.reader import Record
     from dubins_traffic.roads.formats import registry as formats
     from dubins_traffic.roads.network import RoadNetwork

@@ -75,11 +75,11 @@ def evaluate(
 
     What is finished is kept; the same command goes on after Ctrl-C.
     """
+    from dubins_traffic.campaign.notice import fault_notice
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.competition import judging
     from dubins_traffic.competition.submission import EVALUATIONS, check_apart, check_submission
     from dubins_traffic.competition.visibility import summary
-    from dubins_traffic.scoring.notice import fault_notice
 
     own = _competition(competition).phase(phase)
     base = Path(output or EVALUATIONS)

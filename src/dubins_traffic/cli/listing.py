@@ -14,7 +14,7 @@ from dubins_traffic.cli import options
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from dubins_traffic.runs.catalogue import Entry, Parameter
+    from dubins_traffic.cli.catalogue import Entry, Parameter
 
 EXAMPLES = options.examples(
     "list agents", "list rules", "list configurations --json", "list controllers", "list metrics"
@@ -41,7 +41,7 @@ def listing(
     json: Annotated[bool, typer.Option("--json", help="Print JSON for machines.")] = False,
 ) -> None:
     """List what there is, with what each does, its parameters and their defaults."""
-    from dubins_traffic.runs import catalogue
+    from dubins_traffic.cli import catalogue
 
     if subject is Subject.RULES:
         rules = catalogue.rules()

@@ -8,10 +8,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeAlias
 
+from dubins_traffic.campaign.notice import assumption_notice
 from dubins_traffic.cli import faults
 from dubins_traffic.cli.costs import worst
 from dubins_traffic.errors import shown
-from dubins_traffic.scoring.notice import assumption_notice
 
 if TYPE_CHECKING:
     from rich.table import Table

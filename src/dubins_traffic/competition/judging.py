@@ -25,6 +25,7 @@ import numpy as np
 from pydantic import Field
 
 from dubins_traffic.campaign import rows
+from dubins_traffic.campaign.columns import SECOND
 from dubins_traffic.cars.state import Contact, Frames
 from dubins_traffic.competition.competition import Phase
 from dubins_traffic.competition.submission import Submission
@@ -41,7 +42,6 @@ from dubins_traffic.runs.crew import Cancelled, Processes, carry_out
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.sandbox import boxed_controller, owner_of
 from dubins_traffic.sandbox.controller import TRUST
-from dubins_traffic.scoring.columns import SECOND
 
 Owner = Literal["submission", "platform"]
 _OWN_ENDS = (End.DURATION, End.COLLISION)
@@ -63,7 +63,7 @@ class Judged(Strict):
     number: int
     """Of the trial in its phase."""
     row: dict[str, Any]
-    """The score by columns (`scoring.columns.SCORES`), with ``number``, ``end`` and ``reason``: what ranking reads."""
+    """The score by columns (`campaign.columns.SCORES`), with ``number``, ``end`` and ``reason``: what ranking reads."""
     end: str
     """Why the trial ended: a named end, or ``failed`` if it could not be run."""
     owner: Owner | None

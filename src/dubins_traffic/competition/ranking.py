@@ -11,6 +11,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
+from dubins_traffic.campaign.columns import SCORES, SECOND
 from dubins_traffic.campaign.report.comparison import Difference
 from dubins_traffic.campaign.report.statistics import Estimate, Interval, Share, estimate, share
 from dubins_traffic.competition.competition import Phase
@@ -18,7 +19,6 @@ from dubins_traffic.competition.judging import OWNERS, Judged
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.protocols import End
-from dubins_traffic.scoring.columns import SCORES, SECOND
 from dubins_traffic.scoring.icra2016 import COLLISION_SCORE
 from dubins_traffic.scoring.verdict import Ruling, was_cut
 

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Final, Literal
 
+from dubins_traffic.campaign.columns import SECOND
 from dubins_traffic.competition.competition import Phase
 from dubins_traffic.competition.judging import Judged
 from dubins_traffic.competition.ranking import is_clean, is_cut, is_satisfied, missing, value
-from dubins_traffic.scoring.columns import SECOND
 
 State = Literal[
     "received", "checking", "queued", "running", "scoring", "done", "rejected", "failed", "cancelled"

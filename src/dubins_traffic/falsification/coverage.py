@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
+from dubins_traffic.campaign.notice import fault_notice
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.scoring.verdict import EGO_RULES
 
 if TYPE_CHECKING:

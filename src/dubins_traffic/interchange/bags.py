@@ -31,7 +31,7 @@ from dubins_traffic.protocols import End, Ending, Sink
 from dubins_traffic.record.reader import Record
 from dubins_traffic.record.writer import RecordWriter, record_paths
 from dubins_traffic.rules.labeller import Labeller
-from dubins_traffic.rules.labels import words
+from dubins_traffic.transports.labels import words
 from dubins_traffic.transports.ros import half, heading
 from dubins_traffic.transports.ros1.messages import definitions
 from dubins_traffic.transports.ros1.transport import COMMANDS

@@ -19,6 +19,7 @@ from pydantic import ValidationError
 from dubins_traffic.above import ABOVE
 from dubins_traffic.campaign import rows
 from dubins_traffic.campaign.manifest import hash_of_file
+from dubins_traffic.campaign.notice import fault_notice
 from dubins_traffic.campaign.report.plots import figures
 from dubins_traffic.campaign.report.statistics import distributions
 from dubins_traffic.campaign.run_campaign import Progress, run_campaign
@@ -33,7 +34,6 @@ from dubins_traffic.record.sink import FAULTS
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.runs.jobs import Job, run_trials
 from dubins_traffic.scoring import registry as scores
-from dubins_traffic.scoring.notice import fault_notice
 from dubins_traffic.scoring.registry import STRATEGY_SHARE
 from dubins_traffic.suites.results import KEPT, GameResult, played, save, save_trials
 from dubins_traffic.suites.suite import CaseEntry, GameEntry, Suite

@@ -14,13 +14,13 @@ from typing import Annotated, Any
 from pydantic import Field, model_validator
 
 from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.columns import SCORES
 from dubins_traffic.campaign.settings import CampaignModel
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import is_file, read_text
 from dubins_traffic.problem.faults import Strict, fault, parse
 from dubins_traffic.problem.files import parse_json, plain
 from dubins_traffic.problem.parts import LatticePoint
-from dubins_traffic.scoring.columns import SCORES
 
 NAME = r"^[a-z0-9][a-z0-9-]*$"
 SHORT = 12

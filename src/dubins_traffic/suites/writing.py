@@ -8,13 +8,13 @@ from pathlib import Path
 from typing import Any
 
 from dubins_traffic.campaign import rows
+from dubins_traffic.campaign.columns import SCORES, SECOND
 from dubins_traffic.campaign.report.comparison import WALL_METRICS, Comparison, Standing, shown
 from dubins_traffic.campaign.report.statistics import Estimate, Share, share
 from dubins_traffic.campaign.report.write import csv_files, page
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, require_output, write_text
 from dubins_traffic.record.sink import BY_CONTROLLER, FAULTS
-from dubins_traffic.scoring.columns import SCORES, SECOND
 from dubins_traffic.scoring.verdict import Ruling, told_cut, was_cut
 from dubins_traffic.suites.results import (
     GameResult,

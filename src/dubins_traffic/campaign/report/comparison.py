@@ -13,10 +13,10 @@ import numpy as np
 
 from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.columns import REPORTED, SCORES, SECOND
 from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import BY_CONTROLLER
-from dubins_traffic.scoring.columns import REPORTED, SCORES, SECOND
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, Ruling, was_cut

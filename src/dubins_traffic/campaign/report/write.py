@@ -17,6 +17,7 @@ from typing import Any
 from dubins_traffic.campaign import folder as folders
 from dubins_traffic.campaign import manifest, rows, table
 from dubins_traffic.campaign.campaign import Campaign
+from dubins_traffic.campaign.notice import assumption_notice
 from dubins_traffic.campaign.report import plots
 from dubins_traffic.campaign.report.comparison import RANKING, Comparison, compare, number_of, shown, words
 from dubins_traffic.campaign.report.conclusion import conclusion
@@ -28,7 +29,6 @@ from dubins_traffic.campaign.report.worst import worst as find_worst
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, replace_file, require_output, write_text
 from dubins_traffic.rules.clauses import explain
-from dubins_traffic.scoring.notice import assumption_notice
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, told_cut
 from dubins_traffic.viewer.pages import PAGES, render
 

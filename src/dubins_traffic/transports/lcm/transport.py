@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.errors import TransportError
 from dubins_traffic.protocols import End, Ending, Mailbox, View
-from dubins_traffic.rules.labels import Caption
+from dubins_traffic.transports.labels import Caption
 from dubins_traffic.transports.lcm import connection, encoding
 from dubins_traffic.transports.lcm.dubins_traffic_lcm import (
     command_t,

@@ -10,7 +10,7 @@ from dubins_traffic.cars.state import State
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.parts import Laser
 from dubins_traffic.protocols import View
-from dubins_traffic.rules.labels import Caption
+from dubins_traffic.transports.labels import Caption
 from dubins_traffic.transports.ros import half
 from dubins_traffic.transports.ros1.world import BASE, ODOMETRY
 from dubins_traffic.transports.ros2 import messages as m
