@@ -134,10 +134,10 @@ def test_the_controller_on_the_page_on_batches_drives_alike_alone():
 
 
 @pytest.mark.path
-def test_a_controller_takes_ten_lines():
+def test_a_controller_takes_few_lines():
     (controller,) = [text for text in blocks("python") if FILE_NAME.match(text)]
     code = [line for line in controller.splitlines() if line.strip() and not line.startswith("#")]
-    assert len(code) <= 10
+    assert len(code) <= 14  # with ten it follows its lane, but breaks rules before its first visit
 
 
 @pytest.mark.parametrize("target", ["demo", "test", "check", "bench"])

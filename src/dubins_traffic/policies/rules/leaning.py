@@ -11,13 +11,17 @@ import numpy as np
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
-from dubins_traffic.policies.rules.seeing import SIDE, is_by_disc_behind
+from dubins_traffic.policies.rules.seeing import SIDE, is_by_disc_behind, way_to_go
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath, on_way
 from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import half_across
+
+BESIDE_LINE = 1.5
+"""So near to the disc at the end of its lane, metres, a car leans past an ego that stands beside the line. Farther back
+it goes by in the middle of its lane, where it has room to turn straight again."""
 
 
 @jit_inline
@@ -58,7 +62,10 @@ def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
     begin, end = int(roads.degree[first + lane_start(roads, net, lane)]), int(roads.degree[first + v])
     if disc < 0 and begin < vehicle.degree and end < vehicle.degree:
         return True
-    return disc in (-1, v) and not is_by_disc_behind(b, n, way, traffic) and ego_stands_beside(b, n, traffic)
+    if disc not in (-1, v) or is_by_disc_behind(b, n, way, traffic):
+        return False
+    near = way_to_go(way, traffic.state.x[b, n], traffic.state.y[b, n]) > -(vehicle.disc + BESIDE_LINE)
+    return near and ego_stands_beside(b, n, traffic)
 
 
 @jit_rare
