@@ -14,6 +14,7 @@ from dubins_traffic.engine.batch import run_batch
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.sandbox import available
 from dubins_traffic.sandbox.layers import BOX, Layers
 from dubins_traffic.sessions.registry import TRANSPORTS
 from dubins_traffic.suites import running
@@ -76,7 +77,7 @@ def test_strangers_controllers_get_boxes() -> None:
 
 
 def test_without_boxes_a_line_says_that_they_are_trusted(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(running, "available_layers", lambda: Layers(why="no bwrap").without(*BOX))
+    monkeypatch.setattr(available, "available_layers", lambda: Layers(why="no bwrap").without(*BOX))
     specs, notice = running.seated(["rules", "mine.py:Mine"])
     assert specs == ["rules", "mine.py:Mine"]
     assert notice.startswith("mine.py:Mine: in process, trusted, since ")
