@@ -225,9 +225,17 @@ def test_a_builder_takes_no_notice_of_lines_it_cannot_use(cache) -> None:
 
 
 INTERRUPTED = """
-import _thread, threading, time
+import _thread, os, pathlib, threading, time
 from dubins_traffic.kernels.trig import sincos
-threading.Timer(0.2, _thread.interrupt_main).start()
+from tests.builders import builders
+
+def interrupt():
+    while not builders(pathlib.Path(os.environ["NUMBA_CACHE_DIR"])):
+        time.sleep(0.2)
+    time.sleep(0.2)  # the builder is there before it is told what is wanted
+    _thread.interrupt_main()
+
+threading.Thread(target=interrupt, daemon=True).start()
 try:
     print(sincos(0.5))
     while True:
