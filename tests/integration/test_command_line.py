@@ -236,7 +236,8 @@ def test_a_table_for_people(run):
     assert "controller simple" in out
     assert "duration" in out
     assert out.split("───")[0].splitlines()[-1].split()[-2:] == ["paper", "2016"]
-    assert out.splitlines()[-2:] == NOTE.splitlines()
+    note = NOTE.splitlines()
+    assert out.splitlines()[-len(note) :] == note
     assert max(map(len, out.splitlines())) <= 80
 
 
