@@ -213,6 +213,9 @@ def test_a_campaign_and_its_report(capsys: pytest.CaptureFixture[str]) -> None:
     assert found.table["clean"].to_pylist() == [False] * 4
     assert "satisfied" not in found._repr_html_()
     assert main(["campaign", "report", "out", "--worst", "0"]) == 0
+    each = "own.py:GivesUp 2 of 2, own.py:Raises 2 of 2"
+    assert f"Trials ended by the controller: {each}." in capsys.readouterr().out.splitlines()
+    assert main(["campaign", "report", "out", "--worst", "0", "--all", "--overwrite"]) == 0
     told = [line.split() for line in capsys.readouterr().out.splitlines()]
     counts = [line for line in told if line[:4] == ["ended", "by", "the", "controller"]]
     assert [line[-5:-3] for line in counts] == [["2", "100.0%"]] * 2
