@@ -84,6 +84,7 @@ ASKED = (
     Asked("batch demo --controller simple --trials 2"),
     Asked("score out/trial-0000.mcap"),
     Asked("check out/trial-0000.mcap"),
+    Asked("explain 3.stop"),
     Asked("verify out/trial-0000.mcap"),
     Asked("check-controller simple", once=True),
     Asked("spec one.json"),
@@ -109,6 +110,7 @@ ASKED = (
     Asked("convert out/trial-0000.mcap -o t.parquet", ("pyarrow",)),
     Asked("campaign run c.toml -o c --workers 1", ("pyarrow",)),
     Asked("campaign report done", ("pyarrow", "matplotlib", "scipy")),
+    Asked("campaign compare done done", ("pyarrow",)),
     Asked("campaign run c.toml -o r --ray local", ("pyarrow", "ray"), ends=False),
     Asked(
         "suite run icra2016 --controller simple --trials 1 -o s",
