@@ -12,7 +12,7 @@ import numpy as np
 
 from dubins_traffic.campaign.report.comparison import floats, metrics_of, number_of, ranked, shown
 from dubins_traffic.campaign.report.conclusion import FEWEST
-from dubins_traffic.campaign.report.statistics import Estimate, Interval, apart, estimate
+from dubins_traffic.campaign.report.statistics import Estimate, Interval, apart, estimate, is_decided
 from dubins_traffic.campaign.report.write import open_campaign
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.scoring.metric import Column
@@ -36,7 +36,7 @@ class Change:
     @property
     def is_decided(self) -> bool:
         """Whether the interval leaves out 0."""
-        return self.interval[0] > 0 or self.interval[1] < 0
+        return is_decided(self.interval)
 
 
 @dataclass(frozen=True, slots=True)

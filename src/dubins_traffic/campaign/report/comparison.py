@@ -14,7 +14,7 @@ import numpy as np
 from dubins_traffic.campaign import rows, table
 from dubins_traffic.campaign.campaign import Campaign
 from dubins_traffic.campaign.columns import REPORTED, SCORES, SECOND
-from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, share
+from dubins_traffic.campaign.report.statistics import Estimate, Share, estimate, is_decided, share
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.scoring.formulas import Status
@@ -90,7 +90,7 @@ class Difference:
     def is_decided(self) -> bool:
         """Whether the interval of the mean leaves out 0."""
         ends = self.estimate.mean_interval
-        return ends is not None and (ends[0] > 0 or ends[1] < 0)
+        return ends is not None and is_decided(ends)
 
     @property
     def better(self) -> str | None:

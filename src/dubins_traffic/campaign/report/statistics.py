@@ -77,6 +77,11 @@ def estimate(values: Floats, *, median: bool = True) -> Estimate:
     return Estimate(count, mean, about, middle, between)
 
 
+def is_decided(interval: Interval) -> bool:
+    """Tell whether the interval of a difference leaves out 0."""
+    return interval[0] > 0 or interval[1] < 0
+
+
 def apart(first: Floats, second: Floats) -> tuple[float | None, Interval | None]:
     """Return how much the mean of independent values exceeds that of others, with its 95 % interval; NaN are left out.
 

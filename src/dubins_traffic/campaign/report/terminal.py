@@ -46,13 +46,13 @@ def short_tables(comparison: Comparison, width: int = WIDTH) -> Iterator[str | T
     yield ""
     chosen = _fitting(comparison, short_metrics(comparison), width)
     yield _short_table(comparison, chosen)
-    ended = [
-        f"{own.controller} {own.ended.count} of {own.ended.total}"
-        for own in comparison.standings[:MOST_CONTROLLERS]
-        if own.ended.count
-    ]
+    ended = [own for own in comparison.standings if own.ended.count]
     if ended:
-        yield _wrapped(f"Trials ended by the controller: {', '.join(ended)}.", width)
+        each = [
+            f"{own.controller} {own.ended.count} of {own.ended.total}" for own in ended[:MOST_CONTROLLERS]
+        ]
+        rest = f", and {len(ended) - len(each)} more controllers" if len(ended) > len(each) else ""
+        yield _wrapped(f"Trials ended by the controller: {', '.join(each)}{rest}.", width)
     left = [metric for metric in comparison.metrics if metric not in chosen]
     zeros = sum(is_zero(comparison, metric) for metric in left)
     more = len(comparison.standings) - MOST_CONTROLLERS
