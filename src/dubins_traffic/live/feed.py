@@ -176,23 +176,5 @@ class Feed:
 
 def _block(rate: float, state: State, labels: Labels) -> Frames:
     """Return frame 0 as a block, which shares the arrays."""
-    nothing = np.zeros_like(state.x)
-    return Frames(
-        first=0,
-        rate=rate,
-        x=state.x,
-        y=state.y,
-        c=state.c,
-        s=state.s,
-        speed=state.speed,
-        yaw_rate=state.yaw_rate,
-        command_speed=nothing,
-        command_yaw_rate=nothing,
-        segment=labels.segment,
-        at=labels.at,
-        crosses=labels.crosses,
-        lane=labels.lane,
-        bits=labels.bits,
-        contacts=(),
-        events=(),
-    )
+    asked = [np.zeros_like(state.x)] * 2
+    return Frames(0, rate, *state[:6], *asked, *labels)

@@ -136,7 +136,7 @@ class Server:
         ):  # earlier versions of websockets let nothing else through
             return _response(405, "the page is there to be read", "text/plain", {"Allow": "GET"})
         try:
-            door = self._access.admit(request.path, _Read(request.headers))
+            door = self._access.admit(request.path, request.headers)
         except RefusedError as error:
             return _response(error.status, error.text, "text/plain")
         if door is Door.EXCHANGE:
@@ -253,17 +253,6 @@ class _Seat:
                 return None
             case _:
                 raise ValueError("no message of a page")
-
-
-class _Read:
-    """Headers of a request, of which none raises for being there twice."""
-
-    def __init__(self, headers: Headers) -> None:
-        self._headers = headers
-
-    def get_all(self, key: str, /) -> list[str]:
-        """Return all values of a header."""
-        return self._headers.get_all(key)
 
 
 def _number(connection: ServerConnection) -> int:
