@@ -53,7 +53,7 @@ GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
         "Choices of e-agents",
         tuple(f"agents.choices.{name}" for name in ("drawn", "mutated", "reductions", "with_choices", "table_of")),
     ),
-    "seams": ("Seams", ("Simulator", "Sink")),
+    "seams": ("Seams", ("Simulator", "Sink", "Watcher")),
     "errors": ("Errors", ("DubinsTrafficError", "InputError", "ControllerError", "RecordError")),
 }  # fmt: skip
 """Page: its heading and names."""

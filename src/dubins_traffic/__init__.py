@@ -41,7 +41,7 @@ if TYPE_CHECKING:  # without the module `typing`: the program `dubins-traffic` h
     from dubins_traffic.problem.document import instance_from_document, instance_to_document, load_instance
     from dubins_traffic.problem.draw import draw
     from dubins_traffic.problem.instance import EAgent, Instance, Problem
-    from dubins_traffic.protocols import Controller, End, Ending, Simulator, Sink
+    from dubins_traffic.protocols import Controller, End, Ending, Simulator, Sink, Watcher
     from dubins_traffic.record.reader import Record
     from dubins_traffic.record.writer import RecordWriter
     from dubins_traffic.roads.generate import generate as generate_network
@@ -89,7 +89,7 @@ _PLACES = {
     "problem.document": ("instance_from_document", "instance_to_document", "load_instance"),
     "problem.draw": ("draw",),
     "problem.instance": ("EAgent", "Instance", "Problem"),
-    "protocols": ("Controller", "End", "Ending", "Simulator", "Sink"),
+    "protocols": ("Controller", "End", "Ending", "Simulator", "Sink", "Watcher"),
     "record.reader": ("Record",),
     "record.writer": ("RecordWriter",),
     "roads.generate": ("generate_network=generate",),
@@ -178,6 +178,7 @@ __all__ = [
     "Twist",
     "Verdict",
     "Verification",
+    "Watcher",
     "__version__",
     "animate",
     "draw",
