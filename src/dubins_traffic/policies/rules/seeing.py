@@ -265,11 +265,10 @@ def wanted_gap(
         return FACING_GAP if labels.bits[b, n] & FLAG.LEFT == 0 else MOVING_GAP
     in_disc = labels.crosses[b, n] >= 0
     waits = its & FLAG.EXCUSED != 0 or its & FLAG.APPROACH != 0
-    if part == PART.BEFORE and labels.lane[b, who] != car.lane:
+    if part == PART.BEFORE and labels.lane[b, who] != car.lane and traffic.drivers.way[b, n].crossing != 0:
         v = lane_end(traffic.roads, traffic.drivers.net[b], car.lane)
-        waits = (
-            waits or labels.crosses[b, who] == v
-        )  # nobody is passed there: the line keeps a car far enough
+        # Nobody is passed in a crossing, and its line keeps a car far enough; into a bend the car would drive on.
+        waits = waits or labels.crosses[b, who] == v
     if in_disc or waits:
         return QUEUE_GAP if abs(state.speed[b, who]) < 0.05 or in_disc else MOVING_GAP
     if its & FLAG.STANDS != 0 or (car.kind == KIND.ROUND and part == PART.BEFORE):
