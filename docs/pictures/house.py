@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import sys
-from argparse import ArgumentParser
 import tomllib
+from argparse import ArgumentParser
 from html import escape
 from pathlib import Path
 
