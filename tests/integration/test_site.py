@@ -220,6 +220,7 @@ LOOKS = ("color-contrast", "scrollable-region-focusable")
 """The rules of axe that tell of the width and the theme of a page."""
 
 
+@pytest.mark.long
 @pytest.mark.tools("browser")
 def test_every_page_can_be_read_at_both_widths_and_in_both_themes(
     pages: dict[Path, Page], browser: webdriver.Chrome

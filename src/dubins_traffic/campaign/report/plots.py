@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Any
 
 from dubins_traffic.campaign.report.comparison import RANKING, Comparison, Level, words
-from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.errors import needs
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.canvas import METADATA
@@ -348,10 +348,8 @@ def figures() -> tuple[Any, Any]:
     MissingExtraError
         Without the extra `campaign`.
     """
-    try:
+    with needs("a report", "campaign"):
         return import_module("matplotlib"), import_module("matplotlib.figure")
-    except ImportError as error:
-        raise MissingExtraError("a report", "campaign") from error
 
 
 def _themed(svg: str) -> str:
