@@ -14,12 +14,16 @@ from xml.etree import ElementTree
 import pytest
 import typer
 
+import dubins_traffic as dt
 from dubins_traffic.cli.commands import app
 from tests.reader import Reader
 from tests.shown import COMMAND, ROOT, Block, all_pages, blocks
 from tests.shown_pages import PAGES
+from tests.shown_scores import require_progress, tables
 
 ALL = os.environ.get("DUBINS_TRAFFIC_PAGES") == "all"
+IMPROVED = ("competitions/", "tutorials/competition")
+"""Pages whose examples show scores that the reader's own work makes better, and are run here at full length."""
 ELSEWHERE = {
     "README.md": "test_readme.py",
     "batches.md": "test_readme.py",
@@ -168,5 +172,14 @@ def test_the_code_of_a_page_runs(name: str, tmp_path: Path) -> None:
                         happens(reader)
                 reader.follow(block)
         reader.wait()
+        if name.startswith(IMPROVED):
+            require_progress([table for log in reader.notes.iterdir() for table in tables(log.read_text())])
     finally:
         reader.close()
+
+
+def test_what_drives_in_the_examples_that_are_cut_short_here_gets_somewhere_at_full_length() -> None:
+    """Pages on middleware run `demo`, with controllers that drive straight across country, as this one does."""
+    plan = dt.plan("demo", f"{ROOT / 'examples' / 'controller.py'}:Homing", trials=1)
+    (score,) = plan.conclude(dt.run_trials(plan.jobs)).trials
+    assert score.rounds_before_breach > 0

@@ -27,6 +27,7 @@ from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.learning.flat import FlatObserver
 from dubins_traffic.runs.single import run_trial
 from tests.environments import SHORT, single, vector, weaving
+from tests.unit.test_animate import video_library
 
 OTHERS: dict[str, Any] = {"observation": "dict", "action": "discrete", "frame_skip": 3}
 
@@ -262,20 +263,25 @@ def test_a_discrete_action_of_another_shape_is_refused(action: Any) -> None:
             many.step(action)
 
 
-def test_gymnasiums_recorder_of_videos_takes_what_is_painted(
+@pytest.mark.tools
+def test_gymnasiums_recorder_makes_a_video_of_what_is_painted(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Its encoder, moviepy, stands for itself: it asks for a Pillow older than ours."""
-    written: dict[str, tuple[int, float]] = {}
+    """PyAV stands in for its encoder, moviepy, which asks for a Pillow older than ours; the file is read again."""
+    av = video_library()
 
     class Sequence:
         def __init__(self, frames: list[Any], fps: float) -> None:
             self.frames, self.fps = frames, fps
 
         def write_videofile(self, path: str, **_given: Any) -> None:
-            assert all(frame.dtype == np.uint8 and frame.shape == (80, 120, 3) for frame in self.frames)
-            assert (self.frames[0] != self.frames[-1]).any()
-            written[Path(path).name] = (len(self.frames), self.fps)
+            with av.open(path, "w") as file:
+                stream = file.add_stream("libx264", rate=int(self.fps))
+                stream.height, stream.width = self.frames[0].shape[:2]
+                stream.pix_fmt = "yuv420p"
+                for frame in self.frames:
+                    file.mux(stream.encode(av.VideoFrame.from_ndarray(frame, format="rgb24")))
+                file.mux(stream.encode())
 
     clip = ModuleType("moviepy.video.io.ImageSequenceClip")
     clip.ImageSequenceClip = Sequence  # pyright: ignore[reportAttributeAccessIssue]
@@ -285,7 +291,15 @@ def test_gymnasiums_recorder_of_videos_takes_what_is_painted(
     own = gymnasium.make("dubins_traffic/Town-v0", render_mode="rgb_array", width=120, height=80)
     env = gymnasium.wrappers.RecordVideo(own, str(tmp_path / "videos"), episode_trigger=lambda _: True)
     env.reset(seed=1)
+    painted = [own.render()]
     for _ in range(20):
         env.step(env.action_space.sample())
+        painted.append(own.render())
     env.close()
-    assert written == {"rl-video-episode-0.mp4": (21, own.metadata["render_fps"])}
+    with av.open(str(tmp_path / "videos" / "rl-video-episode-0.mp4")) as file:
+        assert file.streams.video[0].average_rate == own.metadata["render_fps"]
+        seen = [frame.to_ndarray(format="rgb24").astype(int) for frame in file.decode(video=0)]
+    assert len(seen) == len(painted) == 21
+    for image, found in zip(painted, seen, strict=True):
+        assert np.abs(np.asarray(image).astype(int) - found).mean() < 8.0
+    assert (np.asarray(painted[0]) != np.asarray(painted[-1])).any()

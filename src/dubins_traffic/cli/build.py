@@ -24,7 +24,8 @@ def build(
         ),
     ] = None,
     folder: Annotated[
-        Path | None, typer.Option(help="Where to.", show_default="where all commands of this user find it")
+        Path | None,
+        typer.Option(help="Folder of the library.", show_default="where all commands of this user find it"),
     ] = None,
 ) -> None:
     """Build the library of machine code: all kernels, in one process. Needs the extra `compile`.

@@ -135,7 +135,7 @@ def report(
     ] = 3,
     overwrite: options.Replace = False,
     wall: Annotated[
-        bool, typer.Option("--wall", help="Also what was measured on a wall clock, which does not repeat.")
+        bool, typer.Option("--wall", help="Also wall-clock times, which differ from run to run.")
     ] = False,
     everything: Annotated[
         bool, typer.Option("--all", help="Show all metrics, differences and worst trials here, too.")

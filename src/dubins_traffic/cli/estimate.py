@@ -27,7 +27,8 @@ BelowOption = Annotated[
 ]
 MethodOption = Annotated[str, typer.Option("--method", metavar="NAME", help="monte-carlo or splitting.")]
 TrialsOption = Annotated[
-    int | None, typer.Option("--trials", metavar="N", min=1, help="Of Monte Carlo.", show_default="10000")
+    int | None,
+    typer.Option("--trials", metavar="N", min=1, help="Trials of Monte Carlo.", show_default="10000"),
 ]
 DurationOption = Annotated[
     float | None,
@@ -36,9 +37,9 @@ DurationOption = Annotated[
     ),
 ]
 ParticlesOption = Annotated[
-    int, typer.Option("--particles", metavar="N", help="Of splitting: trials on their way at a time.")
+    int, typer.Option("--particles", metavar="N", help="Trials that splitting steps at a time.")
 ]
-RunsOption = Annotated[int, typer.Option("--runs", metavar="R", help="Of splitting: independent runs.")]
+RunsOption = Annotated[int, typer.Option("--runs", metavar="R", help="Independent runs of splitting.")]
 
 
 def estimate(

@@ -152,7 +152,12 @@ def shrink(
     ],
     controller: Annotated[
         str | None,
-        typer.Option("--controller", metavar="C", help="Who drives.", show_default="the one of the case"),
+        typer.Option(
+            "--controller",
+            metavar="C",
+            help="The controller that drives the ego.",
+            show_default="the one of the case",
+        ),
     ] = None,
     output: Annotated[
         str | None,

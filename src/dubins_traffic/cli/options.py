@@ -75,7 +75,9 @@ Output = Annotated[
     str | None,
     typer.Option("--output", "-o", metavar="FILE", help="Write here instead of to standard output."),
 ]
-Replace = Annotated[bool, typer.Option("--overwrite", help="Replace what is there; else it is refused.")]
+Replace = Annotated[
+    bool, typer.Option("--overwrite", help="Replace a file that exists; by default it is refused.")
+]
 Shield = Annotated[
     bool,
     typer.Option(

@@ -72,7 +72,7 @@ def spec(
         typer.Option(
             "--period",
             metavar="SECONDS",
-            help="Of a step, where bounds become steps; without it, the control period.",
+            help="Length of a step, where bounds become steps; by default the control period.",
         ),
     ] = None,
     output: options.Output = None,

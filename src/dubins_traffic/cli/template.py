@@ -22,7 +22,7 @@ class Language(StrEnum):
 
 def template(
     language: Annotated[
-        Language, typer.Argument(metavar="python|cpp", help="Of which language.", show_default=False)
+        Language, typer.Argument(metavar="python|cpp", help="Language of the submission.", show_default=False)
     ],
     folder: Annotated[str, typer.Argument(metavar="DIR", help="A folder to make.", show_default=False)],
 ) -> None:
