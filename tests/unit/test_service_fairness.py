@@ -44,7 +44,7 @@ def joined(service: Service, name: str = "Ann", team: str = "Ants") -> Account:
     """Let a person join with a team of its own."""
     with service.database.writing() as session:
         code = accounts.invite(session, accounts.PARTICIPANT, None, NOW)
-        return accounts.register(session, code, name, "correct horse", team, NOW)
+    return accounts.join(service.database, code, name, "correct horse", team, NOW)
 
 
 def handed(

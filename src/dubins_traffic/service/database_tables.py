@@ -52,7 +52,10 @@ class Account(Base):
 
 
 class Code(Base):
-    """A code of an invitation or of a new password, by its SHA-256; it is good once, until it expires."""
+    """A code of an invitation or of a new password, by its SHA-256; it is good once, until it expires.
+
+    `account_id` is whose password it is for, `made_by` who invites; `used` is also when it was revoked.
+    """
 
     __tablename__ = "code"
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -61,6 +64,7 @@ class Code(Base):
     role: Mapped[str | None] = mapped_column(String(20))
     team_id: Mapped[int | None] = mapped_column(ForeignKey("team.id"))
     account_id: Mapped[int | None] = mapped_column(ForeignKey("account.id"))
+    made_by: Mapped[int | None] = mapped_column(ForeignKey("account.id"))
     expires: Mapped[float]
     used: Mapped[float | None]
 
