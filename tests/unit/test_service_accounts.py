@@ -85,7 +85,8 @@ def test_who_has_no_code_costs_no_hash(database: Database, hasher: Hasher) -> No
     assert hasher.hashes == 0
 
 
-def test_codes_for_a_new_password_are_void_once_one_is_used(database: Database, hasher: Hasher) -> None:
+@pytest.mark.usefixtures("hasher")
+def test_codes_for_a_new_password_are_void_once_one_is_used(database: Database) -> None:
     ann, bob = joined(database), joined(database, "Bob", "Bees")
     with database.writing() as session:
         first, second = (accounts.offer_reset(session, ann, NOW) for _ in range(2))
@@ -96,7 +97,8 @@ def test_codes_for_a_new_password_are_void_once_one_is_used(database: Database, 
     assert accounts.reset(database, other, "another horse", NOW).id == bob.id
 
 
-def test_invitations_that_a_removed_member_may_know_are_void(database: Database, hasher: Hasher) -> None:
+@pytest.mark.usefixtures("hasher")
+def test_invitations_that_a_removed_member_may_know_are_void(database: Database) -> None:
     ann = joined(database)
     with database.reading() as session:
         team = session.get_one(Team, ann.team_id)
@@ -110,7 +112,8 @@ def test_invitations_that_a_removed_member_may_know_are_void(database: Database,
     assert accounts.join(database, elsewhere, "Bob", PASSWORD, "Bees", NOW).team_id != team.id
 
 
-def test_a_team_lists_and_revokes_its_own_invitations(database: Database, hasher: Hasher) -> None:
+@pytest.mark.usefixtures("hasher")
+def test_a_team_lists_and_revokes_its_own_invitations(database: Database) -> None:
     ann, bob = joined(database), joined(database, "Bob", "Bees")
     with database.reading() as session:
         team = session.get_one(Team, ann.team_id)

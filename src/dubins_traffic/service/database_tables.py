@@ -26,13 +26,13 @@ class Base(DeclarativeBase):
 
 
 class Team(Base):
-    """A team; `turn` is the number of the last chunk it was served, by which the queue goes round the teams."""
+    """A team; `turn` counts the seconds of workers that it has had, by which the queue goes round the teams."""
 
     __tablename__ = "team"
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(String(60), unique=True)
     created: Mapped[float]
-    turn: Mapped[int] = mapped_column(default=0)
+    turn: Mapped[float] = mapped_column(default=0.0)
     accounts: Mapped[list[Account]] = relationship(back_populates="team")
 
 
@@ -167,6 +167,7 @@ class Chunk(Base):
     state: Mapped[str] = mapped_column(String(10))
     token: Mapped[int] = mapped_column(default=0)
     attempts: Mapped[int] = mapped_column(default=0)
+    leased_at: Mapped[float | None]
     leased_until: Mapped[float | None]
     worker: Mapped[str] = mapped_column(String(60), default="")
     note: Mapped[str] = mapped_column(Text, default="")

@@ -33,7 +33,7 @@ IDLE_S = 0.5
 AWAY_S = 2.0
 UNFIT_S = 5.0
 """How long a worker that has no room leaves the work to others."""
-LONGEST_S = 60.0
+LONGEST_S = 1.0
 """A chunk whose trials have taken so long is reported as far as it is done: others wait for no more than this."""
 NO_ROOM = frozenset(
     (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM)

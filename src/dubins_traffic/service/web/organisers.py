@@ -121,7 +121,10 @@ class Organisers(Controller):
         """Show the phases of a competition and all its submissions."""
         with service.database.reading() as session:
             row = receiving.competition_named(session, slug)
-            document, places = viewing.competition_document(service, row), queue.places(session)
+            document, places = (
+                viewing.competition_document(service, row),
+                queue.places(session, service.clock()),
+            )
             for phase, shown in zip(row.phases, document["phases"], strict=True):
                 its_submissions = receiving.submissions_of(session, phase, None)
                 shown["submissions"] = [

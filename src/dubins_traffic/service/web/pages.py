@@ -93,7 +93,7 @@ class Pages(Controller):
             row = receiving.phase_named(session, slug, name)
             document, mine, used = viewing.phase_document(service, row, at), [], None
             if account is not None and account.team_id is not None:
-                places = queue.places(session)
+                places = queue.places(session, service.clock())
                 its_submissions = receiving.submissions_of(session, row, account.team_id)
                 mine = [
                     viewing.submission_document(service, session, one, None, places, logs=False)
@@ -260,7 +260,7 @@ class Submitting(Controller):
 def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
     with service.database.reading() as session:
         submission = receiving.submission_numbered(session, number, viewer.account)
-        places = queue.places(session)
+        places = queue.places(session, service.clock())
         document = viewing.submission_document(
             service, session, submission, viewer.account, places, logs=False
         )
