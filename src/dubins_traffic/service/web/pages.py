@@ -382,10 +382,11 @@ def _shown(service: Service, viewer: Viewer, code: str = "", token: str = "") ->
         team = session.get(Team, viewer.person.team_id) if viewer.person.team_id else None
         members = [member.name for member in team.accounts] if team else []
         tokens = accounts.tokens(session, viewer.person)
-        invitations = accounts.invitations(session, service.clock(), team.id) if team else []
-    given = {"team": team, "members": members, "tokens": tokens, "code": code, "token": token}
-    given["invitations"] = invitations
-    return page(service, viewer, "team", "Team and account", url=service.settings.url, **given)
+        invitations = () if team is None else accounts.invitations(session, service.clock(), team.id)
+    given = {"team": team, "members": members, "tokens": tokens, "invitations": invitations}
+    return page(
+        service, viewer, "team", "Team and account", url=service.settings.url, code=code, token=token, **given
+    )
 
 
 Asked = Request[Any, Any, Any]
