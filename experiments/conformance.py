@@ -87,8 +87,9 @@ def failed(own: Came) -> bool:
 def bars(found: Sequence[Came]) -> list[Row]:
     """Return the table of the bars."""
     rows: list[Row] = []
-    blocking = [own for own in found if own.name in BLOCKING]
-    provoking = [own for own in found if own.name in PROVOKING and not own.own]
+    admitted = [own for own in found if own.admitted]
+    blocking = [own for own in admitted if own.name in BLOCKING]
+    provoking = [own for own in admitted if own.name in PROVOKING and not own.own]
     for name, own, says in (
         ("who blocks", blocking, "the ego waits longer than the bound, or breaks a rule first"),
         ("who provokes", provoking, "a lawful car breaks a rule"),
@@ -101,9 +102,13 @@ def bars(found: Sequence[Came]) -> list[Row]:
     rows.append(
         Row("longest wait of the others, share of its bound", f"{max(waits, default=0.0):.2f}", "", True)
     )
-    unclean = sum(1 for own in found if own.name in PROVOKING and own.own)
+    unclean = sum(1 for own in admitted if own.name in PROVOKING and own.own)
     rows.append(
         Row("trials that do not count: who is to provoke breaks a rule first", f"{unclean:,}", "", True)
+    )
+    refused = len(found) - len(admitted)
+    rows.append(
+        Row("trials that do not count: an obstacle bars a goal, or the way", f"{refused:,}", "", True)
     )
     return rows
 

@@ -42,11 +42,12 @@ def browsing(
         driver.quit()
 
 
-def faults(browser: webdriver.Chrome) -> list[str]:
-    """Return what axe finds of the page that is serious."""
-    browser.execute_script(AXE.read_text(encoding="utf-8"))
+def faults(browser: webdriver.Chrome, *rules: str) -> list[str]:
+    """Return what axe finds of the page that is serious, by all its rules or by those that are named."""
+    browser.execute_script(f"if (!window.axe) {{ {AXE.read_text(encoding='utf-8')} }}")
+    asked = {"iframes": False, **({"runOnly": rules} if rules else {})}
     found = browser.execute_async_script(
-        "const done = arguments[arguments.length - 1]; axe.run({iframes: false}).then(r => done(r.violations))"
+        "const [asked, done] = arguments; axe.run(asked).then(r => done(r.violations))", asked
     )
     return [
         f"{one['id']}: {one['nodes'][0]['html'][:200]}"

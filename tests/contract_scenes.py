@@ -12,7 +12,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Final
 
+from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Problem
+from dubins_traffic.problem.obstructions import check_obstructions
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.judging import Judging
@@ -27,7 +29,8 @@ SCENES: Final[Mapping[str, Scene]] = {**BLOCKING, **PROVOKING}
 class Came:
     """What came of a scene: the ego's breaches before the first of the others', these, the visits, the longest wait.
 
-    That is the longest time without a visit until the first breach of an e-agent's or the end, seconds.
+    That is the longest time without a visit until the first breach of an e-agent's or the end, seconds. A scene that is
+    not `admitted` has obstacles that every document with them is refused for (docs/rules.md#passable).
     """
 
     name: str
@@ -37,6 +40,7 @@ class Came:
     visits: int
     waited: float
     bound: float
+    admitted: bool
 
 
 def bound_of(problem: Problem, rules: RuleParameters) -> float:
@@ -44,6 +48,15 @@ def bound_of(problem: Problem, rules: RuleParameters) -> float:
     longest = float(problem.network.lengths.max()) / problem.car.bounds.speed
     journey = 2.0 * rules.rest_time + rules.journey_lengths * longest
     return (1 + len(problem.e_agents)) * journey + rules.goal_time
+
+
+def is_admitted(problem: Problem) -> bool:
+    """Tell whether no obstacle bars a goal or the way to one."""
+    try:
+        check_obstructions(problem)
+    except InputError:
+        return False
+    return True
 
 
 def trial(name: str, number: int, seconds: float | None = None) -> Came:
@@ -67,4 +80,5 @@ def trial(name: str, number: int, seconds: float | None = None) -> Came:
     return Came(
         name, number, own, tuple(f"{one.rule} {one.car} {one.since:.2f}-{one.time:.2f}" for one in others),
         len(visits), max(b - a for a, b in pairwise(marks)), bound_of(instance.problem, rules),
+        is_admitted(instance.problem),
     )  # fmt: skip

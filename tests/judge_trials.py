@@ -10,7 +10,7 @@ from dataclasses import replace
 from functools import partial
 from multiprocessing import Pool
 
-from dubins_traffic.cars.body import Car, DiscObstacle, Obstacle, PolygonObstacle, Rectangle
+from dubins_traffic.cars.body import Bounds, Car, DiscObstacle, Obstacle, PolygonObstacle, Rectangle
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
 from tests.chain_reference import RING as BENT_RING
@@ -23,7 +23,7 @@ GRID = RoadNetwork.grid(2, 3, 3.5)
 RING = RoadNetwork.grid(2, 2, 3.2)
 ROADS = (TURNED_STAR, KITE, GRID, RING)
 BENT = (BENT_RING, SNAKE)
-BODIES = (Car(), Car(body=Rectangle(0.5, 0.26)), Car(body=Rectangle(0.3, 0.3)))
+BODIES = (Car(), Car(body=Rectangle(0.5, 0.26), bounds=Bounds(yaw_rate=0.1)), Car(body=Rectangle(0.3, 0.3)))
 QUICK = {
     "left_time": 2.0, "enter_time": 4.0, "exit_time": 1.5, "rest_time": 2.0, "journey_lengths": 0.2,
     "journey_start_time": 0.5, "goal_time": 4.0, "linger_time": 2.0, "shared_time": 0.5, "forfeit_time": 1.5,

@@ -312,7 +312,10 @@ class Reference:
     def narrows(self, low: float, high: float) -> bool:
         if high <= -self.w2 or low >= 0:
             return False
-        return max(low + self.w2, -high) < self.problem.car.body.width + self.rules["blocked_gap"]
+        car = self.problem.car
+        turn = 0.0 if isinstance(car.body, Disc) else car.bounds.yaw_rate * car.body.reach
+        travel = (max(abs(car.bounds.speed_low), abs(car.bounds.speed)) + turn) / self.problem.rate
+        return max(low + self.w2, -high) < car.body.width + max(self.rules["blocked_gap"], travel + 0.02)
 
     def obstacle_range(self, lane: tuple[int, int], obstacle: Any, low: float, high: float) -> Any:
         """Lateral range of an obstacle where its progress is in [low, high] on the segment, by sampling."""

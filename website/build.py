@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from argparse import ArgumentParser
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -26,7 +27,11 @@ def main() -> int:
     int
         The exit status: 0 if there was no warning.
     """
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else ROOT / "build" / "site"
+    parser = ArgumentParser(description="Build the site of the documentation; warnings are errors.")
+    parser.add_argument(
+        "folder", nargs="?", type=Path, default=ROOT / "build" / "site", help="where to put it"
+    )
+    folder = parser.parse_args().folder
     with TemporaryDirectory() as given:
         source, extra = Path(given) / "source", Path(given) / "extra"
         gather(source)

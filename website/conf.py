@@ -58,6 +58,9 @@ html_copy_source = False
 html_show_search_summary = False  # a page opened from a file may not read others
 html_theme_options: dict[str, Any] = {"navigation_with_keys": True}
 
+SCROLLED = r'<pre\b|<div class="table-wrapper\b[^"]*"|<p(?=><img [^>]*\.(?:svg|png)")'
+"""What is as wide as its content on a narrow page, and moves sideways there: code, tables, and drawings with words."""
+
 
 def without_aliases(_app: Any, _what: str, _name: str, _object: Any, _options: Any, lines: list[str]) -> None:
     """Take away what Python itself says of the fields of a named tuple: "Alias for field number 0"."""
@@ -70,7 +73,17 @@ def with_pages(_app: Any, _what: str, _name: str, _object: Any, _options: Any, l
     lines[:] = [re.sub(r"`?\bdocs/([\w/-]+)\.md`?(?!#)", r":doc:`\1 </\1>`", line) for line in lines]
 
 
+def for_every_reader(_app: Any, _page: str, _template: str, context: dict[str, Any], _tree: Any) -> None:
+    """Let keys move what is wider than its page, and say which level the headings of the sidebar have."""
+    if "furo_navigation_tree" in context:
+        headed = context["furo_navigation_tree"].replace('role="heading"', 'role="heading" aria-level="2"')
+        context["furo_navigation_tree"] = headed
+    if "body" in context:
+        context["body"] = re.sub(SCROLLED, r'\g<0> tabindex="0"', context["body"])
+
+
 def setup(app: Any) -> None:
-    """Tell Sphinx what is done with docstrings."""
+    """Tell Sphinx what is done with docstrings, and with pages when they have been made."""
     app.connect("autodoc-process-docstring", without_aliases)
     app.connect("autodoc-process-docstring", with_pages)
+    app.connect("html-page-context", for_every_reader, priority=900)  # after the theme

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 import tomllib
+from argparse import ArgumentParser
 from html import escape
 from pathlib import Path
 
@@ -139,7 +140,10 @@ def flow() -> str:
 
 def main() -> int:
     """Write both pictures."""
-    folder = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "house"
+    parser = ArgumentParser(description="Draw the pictures of docs/architecture.md.")
+    home = Path(__file__).parent / "house"
+    parser.add_argument("folder", nargs="?", type=Path, default=home, help="where to draw them")
+    folder = parser.parse_args().folder
     folder.mkdir(parents=True, exist_ok=True)
     for name, drawn in (("rooms.svg", rooms()), ("flow.svg", flow())):
         (folder / name).write_text(drawn, encoding="utf-8")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import sys
+from argparse import ArgumentParser
 from collections.abc import Callable
 from pathlib import Path
 
@@ -393,4 +393,8 @@ def main(folder: Path, suffix: str = ".svg") -> None:
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent)
+    parser = ArgumentParser(description="Draw the pictures of docs/task.md.")
+    parser.add_argument(
+        "folder", nargs="?", type=Path, default=Path(__file__).parent, help="where to draw them"
+    )
+    main(parser.parse_args().folder)

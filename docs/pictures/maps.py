@@ -1,11 +1,11 @@
 """Draws the gallery of docs/maps.md: what was lost of `examples/maps` and of towns of SUMO, and a drawn network.
 
-python docs/pictures/maps.py [FOLDER OF SUMO'S tools/game]
+python docs/pictures/maps.py [GAMES]
 """
 
 from __future__ import annotations
 
-import sys
+from argparse import ArgumentParser
 from pathlib import Path
 
 from dubins_traffic.maps.foreign import ForeignFormat
@@ -37,11 +37,14 @@ def draw(source: Path, name: str) -> None:
 
 def main() -> None:
     """Draw all."""
+    parser = ArgumentParser(description="Draw the pictures of docs/maps.md.")
+    parser.add_argument("games", nargs="?", type=Path, help="SUMO's folder tools/game, for its two towns")
+    games = parser.parse_args().games
     write_plot(HERE / "maps-bent.svg", generate(*BENT, bent=0.7), overwrite=True)
     draw(EXAMPLES / "crossing.osm", "maps-crossing")
     for file, name in TOWNS.items():
-        if len(sys.argv) > 1:
-            draw(Path(sys.argv[1]) / file, name)
+        if games:
+            draw(games / file, name)
 
 
 if __name__ == "__main__":

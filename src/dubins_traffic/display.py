@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import Any
 
 from dubins_traffic.above import ABOVE
-from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.errors import needs
 
 
 class Pictured:
@@ -46,17 +46,9 @@ def data_frame(rows: Any) -> Any:
 
 
 def pandas() -> Any:
-    """Return pandas.
-
-    Raises
-    ------
-    MissingExtraError
-        If it is not installed.
-    """
-    try:
+    """Return pandas; MissingExtraError if it is not installed."""
+    with needs("a DataFrame", "pandas"):
         return import_module("pandas")
-    except ImportError:
-        raise MissingExtraError("a DataFrame", "pandas") from None
 
 
 def count(number: int, noun: str) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Generator
+from contextlib import contextmanager
 from typing import Final
 
 _ABSENT: Final = object()
@@ -148,6 +149,17 @@ class MissingExtraError(DubinsTrafficError):
 
     def __init__(self, feature: str, extra: str) -> None:
         super().__init__(f"{feature} needs the extra '{extra}': install dubins-traffic[{extra}]")
+
+
+@contextmanager
+def needs(feature: str, extra: str) -> Generator[None]:
+    """Raise MissingExtraError where a library of an extra can't be imported in the body."""
+    try:
+        yield
+    except ImportError as error:
+        if (error.name or "").startswith("dubins_traffic"):
+            raise
+        raise MissingExtraError(feature, extra) from error
 
 
 def in_python(text: str) -> str:

@@ -207,6 +207,27 @@ def test_letters_of_charts_are_as_large_as_those_of_the_page(
 
 
 @pytest.mark.tools("browser")
+@pytest.mark.parametrize("width", [1280, 400])
+def test_no_words_of_a_chart_are_cut_off(width: int, folder: Path, browser: webdriver.Chrome) -> None:
+    widen(browser, width)
+    browser.get((folder / "report" / "index.html").as_uri())
+    open_all(browser)
+    charts = browser.execute_script("return [...document.images].map(image => image.currentSrc)")
+    assert len(charts) > 10
+    for chart in charts:
+        browser.get(chart)
+        words = browser.execute_script(
+            "const room = document.documentElement.getBoundingClientRect().width;"
+            "return [...document.querySelectorAll('text')].map(word => {"
+            "  const {left, right} = word.getBoundingClientRect();"
+            "  return [word.textContent, left >= 0 && right <= room];"
+            "})"
+        )
+        assert len(words) > 3
+        assert [text for text, is_whole in words if not is_whole] == []
+
+
+@pytest.mark.tools("browser")
 def test_the_page_is_dark_where_it_should_be_and_nothing_scrolls_sideways(
     folder: Path, browser: webdriver.Chrome
 ) -> None:

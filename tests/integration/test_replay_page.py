@@ -136,6 +136,28 @@ def test_the_page_has_no_serious_fault_by_axe(page: webdriver.Chrome, on: bool) 
         page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
+@pytest.mark.parametrize("width", [1280, 400])
+def test_a_long_reason_of_an_end_is_shown_in_full_and_makes_the_page_no_wider(
+    width: int, browser: webdriver.Chrome, trial: tuple[Instance, Frames], tmp_path: Path
+) -> None:
+    tried, frames = trial
+    why = f"ValueError: {'no way to the goal, ' * 20}{'x' * 200}"
+    write_replay(tmp_path / "long.html", tried, frames, Ending(End.CONTROLLER_FAULT, 9, why))
+    try:
+        widen(browser, width)
+        browser.get((tmp_path / "long.html").as_uri())
+        WebDriverWait(browser, 600).until(
+            lambda driver: driver.execute_script("return window.replay?.ready === true")
+        )
+        assert why in element(browser, "ending").text
+        assert sideways(browser) <= 0
+        whole = "const e = document.getElementById('ending'); return e.scrollWidth <= e.clientWidth"
+        assert browser.execute_script(whole)
+        assert element(browser, "play").rect["x"] + element(browser, "play").rect["width"] < width
+    finally:
+        browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
 def test_opens_and_shows_the_trial(page: webdriver.Chrome, trial: tuple[Instance, Frames]) -> None:
     tried, _ = trial
     assert page.title.startswith("Trial 2 of seed 7")

@@ -18,7 +18,7 @@ from selenium.webdriver.support.wait import WebDriverWait
 
 from dubins_traffic.campaign.report.statistics import share
 from dubins_traffic.suites.suite import load_suite, shipped_suites
-from tests.browser import browsing
+from tests.browser import browsing, dark, faults, sideways, widen
 
 ROOT = Path(__file__).parents[2]
 FETCHES = {"link": "href", "script": "src", "img": "src", "iframe": "src", "source": "src", "object": "data"}
@@ -213,3 +213,45 @@ def test_a_page_asks_for_files_beside_it_alone(name: str, site: Path, browser: w
     assert len(asked) > 3
     assert [address for address in asked if not address.startswith(site.as_uri())] == []
     assert [said["message"] for said in browser.get_log("browser") if said["level"] == "SEVERE"] == []
+
+
+WIDTHS = (1280, 400)
+LOOKS = ("color-contrast", "scrollable-region-focusable")
+"""The rules of axe that tell of the width and the theme of a page."""
+
+
+@pytest.mark.long
+@pytest.mark.tools("browser")
+def test_every_page_can_be_read_at_both_widths_and_in_both_themes(
+    pages: dict[Path, Page], browser: webdriver.Chrome
+) -> None:
+    """Nothing is wider than its page, and axe finds no serious fault."""
+    wrong: list[tuple[str, int, bool, list[str]]] = []
+    for path in sorted(pages):
+        browser.get(path.as_uri())
+        for width in WIDTHS:
+            widen(browser, width)
+            if sideways(browser) > 0:
+                wrong.append((path.name, width, False, ["wider than its page"]))
+            for is_dark in (False, True):
+                dark(browser, is_dark)
+                rules = () if (width, is_dark) == (WIDTHS[0], False) else LOOKS
+                if found := faults(browser, *rules):
+                    wrong.append((path.name, width, is_dark, found))
+    assert wrong == []
+
+
+@pytest.mark.tools("browser")
+@pytest.mark.parametrize("name", ["task", "watch", "maps", "falsify"])
+def test_words_in_pictures_are_large_enough_on_a_narrow_page(
+    name: str, site: Path, browser: webdriver.Chrome
+) -> None:
+    """A drawing is as large as it was drawn and moves sideways, and so is a picture of a page, up to 656 pixels."""
+    widen(browser, WIDTHS[1])
+    browser.get((site / f"{name}.html").as_uri())
+    shown = browser.execute_script(
+        "return [...document.querySelectorAll('article p > img')].map("
+        "image => [image.clientWidth, Math.min(image.naturalWidth, 656), image.parentElement.tabIndex])"
+    )
+    assert len(shown) > 0
+    assert [(wide, asked, keys) for wide, asked, keys in shown if wide < asked - 1 or keys] == []

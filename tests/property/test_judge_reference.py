@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from dubins_traffic.cars.body import Car, DiscObstacle, Rectangle
+from dubins_traffic.cars.body import Bounds, Car, DiscObstacle, Rectangle
 from dubins_traffic.cars.state import State
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
@@ -25,7 +25,7 @@ from tests.judging import case, frames_of, judged, said
 from tests.rules_scripts import KITE, STAR, TURNED_STAR, fill, moved, on_lane, wander
 
 GRID = RoadNetwork.grid(2, 3, 3.5)
-BOX = Car(body=Rectangle(0.5, 0.26))
+BOX = Car(body=Rectangle(0.5, 0.26), bounds=Bounds(yaw_rate=0.1))
 QUICK = {
     "left_time": 2.0,
     "enter_time": 4.0,

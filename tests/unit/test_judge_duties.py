@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from dubins_traffic.cars.body import Body, Car, Disc, DiscObstacle, Rectangle
+from dubins_traffic.cars.body import Body, Bounds, Car, Disc, DiscObstacle, Rectangle
 from dubins_traffic.roads.network import RoadNetwork
 from tests.judge_reference import Judge
 from tests.judging import (
@@ -156,8 +156,8 @@ def test_e4_a_free_exit_has_room_for_a_whole_body(roads: RoadNetwork) -> None:
 
 @both
 def test_e4_who_comes_toward_the_disc_takes_an_exit_only_by_narrowing_it(roads: RoadNetwork) -> None:
-    """Rectangles of 0.26 m leave room for another one where their centres are just in the lane."""
-    box, out = Car(body=Rectangle(0.5, 0.26)), lanes_out(roads)
+    """Rectangles of 0.26 m that turn slowly leave room for another one where their centres are just in the lane."""
+    box, out = Car(body=Rectangle(0.5, 0.26), bounds=Bounds(yaw_rate=0.1)), lanes_out(roads)
     inside = on_lane(roads, out[0], 0.1, -0.1)
 
     def found(aside: float, *, comes: bool) -> list[tuple[object, ...]]:

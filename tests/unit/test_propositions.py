@@ -334,6 +334,22 @@ def test_what_stands_ahead_blocks(roads: RoadNetwork, ahead: float, lateral: flo
 
 
 @both
+@pytest.mark.parametrize(
+    ("rate", "room"), [(30.0, 0.1), (10.0, 0.07 + 0.1 * math.pi * math.hypot(0.31, 0.14) + 0.02)]
+)
+def test_room_beside_is_what_a_car_may_reach_in_a_long_tick(
+    roads: RoadNetwork, rate: float, room: float
+) -> None:
+    """Rule page, room beside: a rectangle needs its width and 0.1 m, or 0.02 m more than its point gets in a tick."""
+    car = Car(0.3, Rectangle(0.62, 0.28))
+    for free in (0.28 + room - EPS, 0.28 + room + EPS):
+        obstacle = DiscObstacle(*on_lane(roads, OUT_WEST, 2.0, free - 0.6 + 0.2)[:2], 0.2)
+        trial = instance(roads, 1, obstacles=[obstacle], rate=rate, car=car)
+        found = label([trial], [hold(on_lane(roads, OUT_WEST, 1.3, -0.3), frames=1)])
+        assert ("blocked" in flags(found, 0)[0]) == (free < 0.28 + room)
+
+
+@both
 def test_an_edge_of_an_obstacle_counts_where_it_is_in_reach(roads: RoadNetwork) -> None:
     corners = [on_lane(roads, OUT_WEST, *corner)[:2] for corner in ((2.5, -0.7), (3.6, -0.65), (3.6, 0.3))]
     wall = PolygonObstacle(tuple(corners))

@@ -42,6 +42,16 @@ def test_pictures_are_small() -> None:
     assert all((PICTURES / name).stat().st_size < 100_000 for name in SHOWN)
 
 
+@pytest.mark.parametrize(
+    "script", ["docs/pictures/make", "docs/pictures/maps", "docs/pictures/house", "website/build"]
+)
+def test_a_script_that_is_asked_for_help_gives_it_and_draws_nothing(script: str, tmp_path: Path) -> None:
+    words = [sys.executable, ROOT / f"{script}.py", "--help"]
+    told = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True, timeout=600).stdout
+    assert told.startswith("usage: ")
+    assert list(tmp_path.iterdir()) == []
+
+
 def need_pinned() -> None:
     """Skip where Matplotlib is another one than that by which the pictures were drawn."""
     pinned = re.search(r"^matplotlib==(\S+)$", (ROOT / "constraints.txt").read_text(encoding="utf-8"), re.M)

@@ -17,7 +17,7 @@ from dubins_traffic.animation.indexed import GIF_RATE, write_gif, write_png
 from dubins_traffic.animation.raster import NO_MARKS, SIZES, Raster, picture_size
 from dubins_traffic.animation.raster_kernel import MARKS, Image
 from dubins_traffic.cars.state import EGO, NONE
-from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.errors import InputError, needs
 from dubins_traffic.files import replace_file, require_output
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Problem
@@ -284,11 +284,8 @@ def require_moving(
 
 
 def _library(name: str) -> Any:
-    try:
+    with needs("a GIF" if name == "PIL" else "a video", "video"):
         return importlib.import_module(name)
-    except ImportError:
-        what = "a GIF" if name == "PIL" else "a video"
-        raise MissingExtraError(what, "video") from None
 
 
 def _require_within(field: str, value: float, least: float, most: float) -> None:

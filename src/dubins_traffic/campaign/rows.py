@@ -8,7 +8,7 @@ from io import BytesIO
 from typing import Any, TypeAlias
 
 from dubins_traffic.campaign.columns import SCORES
-from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.errors import needs
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.score import Score
@@ -72,13 +72,10 @@ def arrow() -> Any:
     MissingExtraError
         Without the extra `campaign`.
     """
-    try:
-        found = import_module("pyarrow")
+    with needs("a campaign", "campaign"):
         import_module("pyarrow.parquet")
         import_module("pyarrow.compute")
-    except ImportError as error:
-        raise MissingExtraError("a campaign", "campaign") from error
-    return found
+        return import_module("pyarrow")
 
 
 def part_schema(metrics: Sequence[Column] = ()) -> Any:

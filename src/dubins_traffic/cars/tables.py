@@ -93,6 +93,12 @@ def pack_cars(cars: Sequence[Car]) -> CarTable:
     return CarTable(*np.ascontiguousarray(rows[index].T))
 
 
+def fastest_points(cars: CarTable) -> Floats:
+    """Return the speed (B,) that no point of a car's body exceeds, m/s."""
+    turning = np.where(cars.half_length > 0.0, cars.yaw_rate * cars.reach, 0.0)
+    return np.maximum(cars.speed_high, -cars.speed_low) + turning
+
+
 def pack_obstacles(obstacles: Sequence[Sequence[Obstacle]]) -> ObstacleTable:
     """Return the table of one sequence of obstacles per trial."""
     if not any(obstacles):

@@ -109,11 +109,12 @@ def _run(run: Run, count: int, records: str | None, *, json: bool) -> Batch:
 
     done: list[Outcome] = []
     try:
-        with faults.controllers_drive(), progress(count) as tell:
+        with (
+            faults.interruptible(lambda: f"interrupted after {len(done)} of {count} trials"),
+            faults.controllers_drive(),
+            progress(count) as tell,
+        ):
             run(ended=lambda outcome: (done.append(outcome), tell(len(done), count)))
-    except KeyboardInterrupt:
-        faults.tell(f"interrupted after {len(done)} of {count} trials")
-        raise typer.Exit(faults.FAILED) from None
     finally:
         if done:
             show(in_order(done).sheet, json=json)

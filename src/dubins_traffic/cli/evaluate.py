@@ -86,17 +86,11 @@ def evaluate(
     check_apart(Path(path), base)
     submission = check_submission(path, base / "submissions")
     folder = base if output else base / f"{phase}-{submission.digest[:12]}"
-    try:
-        with progress() as show:
-            done = judging.evaluate(
-                own, submission, folder, workers=workers, trust=trust, records=records, progress=show
-            )
-    except KeyboardInterrupt:
-        faults.tell(
-            f"interrupted; {judging.kept(folder)} of {len(own.numbers)} trials are kept, "
-            "the same command goes on"
+    kept = "interrupted; {} of {} trials are kept, the same command goes on".format
+    with faults.interruptible(lambda: kept(judging.kept(folder), len(own.numbers))), progress() as show:
+        done = judging.evaluate(
+            own, submission, folder, workers=workers, trust=trust, records=records, progress=show
         )
-        raise typer.Exit(faults.FAILED) from None
     if json:
         print(json_text.dumps({**done.to_json(), "summary": summary(own, done.results)}, indent=2))
     else:

@@ -106,25 +106,23 @@ def falsify(
 
     seen: list[Search] = []
     boxes = options.boxes(sandbox, limits, trust)
-    try:
-        with (
-            faults.controllers_drive(),
-            driven(controller, over, shield=shield, sandbox=boxes) as driver,
-            progress(trials) as tell,
-        ):
+    kept = "interrupted after {} trials; --resume goes on".format
+    with (
+        faults.interruptible(lambda: kept(seen[0].finished if seen else 0)),
+        faults.controllers_drive(),
+        driven(controller, over, shield=shield, sandbox=boxes) as driver,
+        progress(trials) as tell,
+    ):
 
-            def heard(own: Search) -> None:
-                seen[:] = [own]
-                tell(own.finished, trials or own.finished)
+        def heard(own: Search) -> None:
+            seen[:] = [own]
+            tell(own.finished, trials or own.finished)
 
-            found = search(
-                configuration, driver, output, rules=rule or (), formula=formula, least_score=least_score,
-                trials=trials, seconds=seconds, seed=seed, strategy=strategy, duration=duration or None,
-                workers=workers, ray=ray, resume=resume, progress=heard,
-            )  # fmt: skip
-    except KeyboardInterrupt:
-        faults.tell(f"interrupted after {seen[0].finished if seen else 0} trials; --resume goes on")
-        raise typer.Exit(faults.FAILED) from None
+        found = search(
+            configuration, driver, output, rules=rule or (), formula=formula, least_score=least_score,
+            trials=trials, seconds=seconds, seed=seed, strategy=strategy, duration=duration or None,
+            workers=workers, ray=ray, resume=resume, progress=heard,
+        )  # fmt: skip
     _show(found, json=json)
     options.tell(output, str(found.page))
     faults.fail_if(found.fault)

@@ -8,7 +8,7 @@ import os
 import sys
 import threading
 import traceback
-from collections.abc import Generator, Iterable, Sequence
+from collections.abc import Callable, Generator, Iterable, Sequence
 from itertools import pairwise
 from typing import TYPE_CHECKING, Final, NoReturn, TextIO
 
@@ -63,6 +63,16 @@ def tell(text: str) -> None:
         print(f"{PROGRAM}: {shown(text)}", file=sys.stderr)
     except BrokenPipeError:  # whoever read it has had enough
         _discard(sys.__stderr__ or sys.stderr)
+
+
+@contextlib.contextmanager
+def interruptible(words: Callable[[], str]) -> Generator[None]:
+    """End the command with status 1 if Ctrl-C comes in the body, and tell what is kept then."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        tell(words())
+        raise typer.Exit(FAILED) from None
 
 
 def warn(notice: str) -> None:

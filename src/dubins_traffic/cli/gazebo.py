@@ -40,12 +40,11 @@ def install(prefix: Prefix = None) -> None:
 
     folder = place(prefix)
     print(installer.announcement(folder), flush=True)
-    try:
-        with _progress() as progress:
-            installer.install(folder, progress)
-    except KeyboardInterrupt:
-        faults.tell("interrupted; the same command goes on where it stopped")
-        raise typer.Exit(faults.FAILED) from None
+    with (
+        faults.interruptible(lambda: "interrupted; the same command goes on where it stopped"),
+        _progress() as progress,
+    ):
+        installer.install(folder, progress)
     print("Gazebo works; use it with --simulator gazebo")
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dubins_traffic.cli import faults, maps, options
-from dubins_traffic.cli.extras import needs
+from dubins_traffic.errors import needs
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -52,8 +52,9 @@ def play(
 ) -> None:
     """Drive the ego yourself, in a page of the browser: keys, a game pad or touch.
 
-    Breaches and whose turn it is are shown at once; then the verdict, and your place beside `simple`, `lanes` and
-    `rules` on the same trial. Who closes the page ends the trial as interrupted.
+    Breaches and whose turn it is are shown at once; at the end the verdict,
+    and your place beside `simple`, `lanes` and `rules` on the same trial.
+    Closing the page ends the trial as interrupted.
     """
     with needs("driving in a page", "watch"):
         from dubins_traffic.live import playing
@@ -65,14 +66,14 @@ def play(
     instance = _instance(source, rnd, seed, trial)
     stage = Stage(options.tell, port, opens=not no_browser, pace=pace, plays=True)
     record = None if output is None else Path(output)
+    left = "the page was closed: the trial is interrupted"
     try:
-        with stage:
+        with faults.interruptible(lambda: left if stage.wheel.left else "interrupted"), stage:
             _, standings = playing.play(stage, instance, summary, record, overwrite=overwrite)
-    except KeyboardInterrupt:
-        faults.tell("the page was closed: the trial is interrupted" if stage.wheel.left else "interrupted")
+    except typer.Exit:
         if record is not None and record.exists():
             options.tell(str(record))
-        raise typer.Exit(faults.FAILED) from None
+        raise
     show(ScoreSheet(tuple(own.score for own in standings)), json=json)
     options.tell(playing.sentence(standings), *([] if output is None else [output]))
 

@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from dubins_traffic.cli import faults, maps, options
-from dubins_traffic.cli.extras import needs
-from dubins_traffic.errors import InputError, WorkerLostError
+from dubins_traffic.errors import InputError, WorkerLostError, needs
 
 if TYPE_CHECKING:
     from dubins_traffic.live.stage import Stage
@@ -173,7 +172,11 @@ def _run(
     results: list[Result] = []
     lost: WorkerLostError | None = None
     try:
-        with faults.controllers_drive(), progress(len(todo.jobs)) as tell:
+        with (
+            faults.interruptible(lambda: f"interrupted after {len(results)} of {len(todo.jobs)} trials"),
+            faults.controllers_drive(),
+            progress(len(todo.jobs)) as tell,
+        ):
             for result in run_trials(todo.jobs, jobs, () if stage is None else (stage.feed,)):
                 results.append(result)
                 if stage is not None:
@@ -181,9 +184,6 @@ def _run(
                     stage.feed.end(result.instance, result.ending, summary(score), score.verdict)
                     stage.feed.finish()
                 tell(len(results), len(todo.jobs))
-    except KeyboardInterrupt:
-        faults.tell(f"interrupted after {len(results)} of {len(todo.jobs)} trials")
-        raise typer.Exit(faults.FAILED) from None
     except WorkerLostError as error:
         lost = error
     finally:

@@ -61,7 +61,7 @@ def serve(
 
     What it needs to know stands in DIR/service.toml; without one it works on this machine alone. Ctrl-C ends it.
     """
-    from dubins_traffic.cli.extras import needs
+    from dubins_traffic.errors import needs
     from dubins_traffic.live import listening
 
     with needs("serving competitions", "service"):

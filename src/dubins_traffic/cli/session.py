@@ -159,13 +159,11 @@ def run_session(todo: SessionPlan, session: Iterable[Result], *, json: bool) -> 
 
     results: list[Result] = []
     try:
-        for result in session:
-            results.append(result)
-            ending = f"{result.ending.end}: {result.ending.detail}".rstrip(": ")
-            faults.tell(f"trial {result.instance.trial}: {ending}")
-    except KeyboardInterrupt:
-        faults.tell(f"interrupted after {len(results)} trials")
-        raise typer.Exit(faults.FAILED) from None
+        with faults.interruptible(lambda: f"interrupted after {len(results)} trials"):
+            for result in session:
+                results.append(result)
+                ending = f"{result.ending.end}: {result.ending.detail}".rstrip(": ")
+                faults.tell(f"trial {result.instance.trial}: {ending}")
     finally:
         if results:
             show(todo.conclude(results), json=json)

@@ -212,14 +212,13 @@ def _trials(
     from dubins_traffic.suites.running import run_suite
 
     faults.warn(short_notice(found.campaign(["simple"]).first_trials()))
-    try:
-        with progress() as tell:
-            return run_suite(
-                found, folder, controllers, trials=trials, workers=workers, resume=resume, progress=tell
-            )
-    except KeyboardInterrupt:
-        faults.tell(f"interrupted; {kept(folder)} trials are kept, --resume goes on")
-        raise typer.Exit(faults.FAILED) from None
+    with (
+        faults.interruptible(lambda: f"interrupted; {kept(folder)} trials are kept, --resume goes on"),
+        progress() as tell,
+    ):
+        return run_suite(
+            found, folder, controllers, trials=trials, workers=workers, resume=resume, progress=tell
+        )
 
 
 def _cases(found: Suite, folder: Path, controllers: list[str], workers: int | None, *, resume: bool) -> Path:
@@ -231,12 +230,11 @@ def _cases(found: Suite, folder: Path, controllers: list[str], workers: int | No
     if not controllers:
         raise InputError("missing", file="--controller", expected="who drives in the cases")
     count = workers or os.cpu_count() or 1
-    try:
-        with progress() as tell:
-            return run_cases(found, folder, controllers, workers=count, resume=resume, progress=tell)
-    except KeyboardInterrupt:
-        faults.tell("interrupted; the cases that are finished are kept, --resume goes on")
-        raise typer.Exit(faults.FAILED) from None
+    with (
+        faults.interruptible(lambda: "interrupted; the cases that are finished are kept, --resume goes on"),
+        progress() as tell,
+    ):
+        return run_cases(found, folder, controllers, workers=count, resume=resume, progress=tell)
 
 
 def _games(found: Suite, folder: Path, solver: str | None, seconds: float, *, resume: bool) -> Path:
@@ -246,12 +244,11 @@ def _games(found: Suite, folder: Path, solver: str | None, seconds: float, *, re
     if solver is not None:
         check_command(solver)
     own = Solver() if solver is None else Solver(solver.split()[0], solver, seconds)
-    try:
-        with progress() as tell:
-            return run_games(found, folder, own, resume=resume, progress=tell)
-    except KeyboardInterrupt:
-        faults.tell("interrupted; the answers that are there are kept, --resume goes on")
-        raise typer.Exit(faults.FAILED) from None
+    with (
+        faults.interruptible(lambda: "interrupted; the answers that are there are kept, --resume goes on"),
+        progress() as tell,
+    ):
+        return run_games(found, folder, own, resume=resume, progress=tell)
 
 
 @suite.command("compare", epilog=COMPARE_EXAMPLES)

@@ -191,8 +191,5 @@ def _progress() -> Generator[Callable[[str, float], object]]:
     columns = (SpinnerColumn(), TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn())
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
         task = progress.add_task("build", total=1.0)
-        try:
+        with faults.interruptible(lambda: "interrupted: the game is not solved"):
             yield lambda what, share: progress.update(task, description=what, completed=share)
-        except KeyboardInterrupt:
-            faults.tell("interrupted: the game is not solved")
-            raise typer.Exit(faults.FAILED) from None

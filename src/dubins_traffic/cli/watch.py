@@ -6,8 +6,8 @@ import inspect
 from typing import TYPE_CHECKING, Any, get_type_hints
 
 from dubins_traffic.cli import faults, options
-from dubins_traffic.cli.extras import needs
 from dubins_traffic.cli.run import run
+from dubins_traffic.errors import needs
 
 if TYPE_CHECKING:
     from dubins_traffic.record.reader import Record
@@ -53,17 +53,13 @@ setattr(watch, "__signature__", inspect.Signature(_PARAMETERS))  # noqa: B010  #
 def _show(source: str, record: Record, *, pace: float, port: int, no_browser: bool) -> None:
     with needs("watching a record in a page", "watch"):
         from dubins_traffic.live.stage import Stage
-    import typer
 
     from dubins_traffic.cli.tables import summary
     from dubins_traffic.live.recorded import show
     from dubins_traffic.scoring.score import score
 
-    try:
-        with Stage(options.tell, port, opens=not no_browser, pace=pace) as stage:
-            last = show(stage.feed, source, record)
-            scored = score(last)
-            stage.feed.end(last.instance, last.ending, summary(scored), scored.verdict)
-    except KeyboardInterrupt:
-        faults.tell("interrupted")
-        raise typer.Exit(faults.FAILED) from None
+    page = Stage(options.tell, port, opens=not no_browser, pace=pace)
+    with faults.interruptible(lambda: "interrupted"), page as stage:
+        last = show(stage.feed, source, record)
+        scored = score(last)
+        stage.feed.end(last.instance, last.ending, summary(scored), scored.verdict)

@@ -77,7 +77,7 @@ def worker(
     With --ray they run on the nodes of a cluster, and one that is lost there is replaced. What is at work when it is
     told to end is given back. It gives way to other programs of the machine.
     """
-    from dubins_traffic.cli.extras import needs
+    from dubins_traffic.errors import needs
 
     with needs("a worker", "service"):
         from dubins_traffic.service import logs

@@ -25,7 +25,7 @@ from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import Field
 
-from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.errors import InputError, needs
 from dubins_traffic.files import is_file, read_text, replace_file
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.faults import Strict, parse
@@ -414,10 +414,8 @@ def _folder(phase: Seeded) -> Path:
 
 def cipher_class() -> Any:
     """Return the class of the cipher; MissingExtraError without the extra `competition`."""
-    try:
+    with needs("sealed seeds", "competition"):
         from cryptography.hazmat.primitives.ciphers.aead import AESGCM
-    except ImportError as error:
-        raise MissingExtraError("sealed seeds", "competition") from error
     return AESGCM
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Final, Protocol
 import numpy as np
 
 from dubins_traffic.agents.choices import BOUNDS, CHOICE
-from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.errors import InputError, needs
 from dubins_traffic.falsification.moves import Genome
 from dubins_traffic.falsification.sampling import Source, Stream
 from dubins_traffic.kernels.arrays import Floats
@@ -229,10 +229,8 @@ class Cma:
     """
 
     def __init__(self, source: Source, targets: Sequence[str]) -> None:
-        try:
+        with needs("--strategy cma", "falsify"):
             self._cma: Any = import_module("cma")
-        except ImportError as error:
-            raise MissingExtraError("--strategy cma", "falsify") from error
         self._source, self._targets = source, tuple(targets)
         self._climbs: dict[str, _Climb] = {}
         self._past: list[tuple[int, int, list[float | None]]] = []

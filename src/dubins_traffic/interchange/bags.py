@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import Contact, Event, Frames, Pose, State
-from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.errors import InputError, needs
 from dubins_traffic.files import begins_with, replace_file, require_output
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
@@ -59,10 +59,8 @@ def typestore() -> Any:
 
     MissingExtraError without the extra `ros1`.
     """
-    try:
+    with needs("reading and writing bags", "ros1"):
         types = import_module("rosbags.typesys")
-    except ImportError as error:
-        raise MissingExtraError("reading and writing bags", "ros1") from error
     store = types.get_typestore(types.Stores.ROS1_NOETIC)
     for file in definitions():
         if file.suffix == ".msg":

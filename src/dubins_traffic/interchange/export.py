@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.errors import InputError, needs
 from dubins_traffic.files import replace_file, require_output
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.record.reader import Record
@@ -61,11 +61,9 @@ def write_parquet(record: Record, path: Path | str, *, overwrite: bool = False) 
         As `write_csv`.
     """
     require_output(path, "a table", (".parquet",), overwrite=overwrite)
-    try:
+    with needs("writing Parquet", "parquet"):
         arrow: Any = import_module("pyarrow")
         parquet: Any = import_module("pyarrow.parquet")
-    except ImportError as error:
-        raise MissingExtraError("writing Parquet", "parquet") from error
     made = arrow.table(table(record))
     replace_file(Path(path), lambda neighbour: parquet.write_table(made, neighbour))
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.state import Pose, State
-from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.errors import InputError, needs
 from dubins_traffic.files import begins_with
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import REMOTE
@@ -118,10 +118,8 @@ def _write(trial: _Trial, number: int, ticks: int, record: Path, *, overwrite: b
 
 
 def _read(name: str) -> _Log:
-    try:
+    with needs("LCM", "lcm"):
         from lcm import EventLog
-    except ImportError as error:
-        raise MissingExtraError("LCM", "lcm") from error
     log = _Log()
     try:
         for event in EventLog(name):

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from dubins_traffic.cars.body import Obstacle
-from dubins_traffic.cars.tables import pack_obstacles
+from dubins_traffic.cars.tables import fastest_points, pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.network import RoadNetwork
@@ -39,7 +39,7 @@ def check_obstructions(problem: Problem) -> None:
             raise _refused(
                 k,
                 f"leaves who comes to the goal {found.name(v)} no exit as wide as a car",
-                "a lane out of it with the body's width and 0.1 m (blocked_gap) free beside the obstacle",
+                "a lane out of it with the body's width and 0.1 m (blocked_gap), or more at a low rate, free beside it",
             )
     found.check_ways(problem.goal_vertices)
 
@@ -131,7 +131,8 @@ class _Beside:
         self._network, self._w = problem.network, car.w
         self._radius = problem.intersection_radius
         self._room = rules.room_beyond(car.body.reach, 2)
-        self._needed = car.body.width + rules.blocked_gap
+        travel = float(fastest_points(pack_cars([car]))[0]) * problem.period
+        self._needed = rules.width_needed(car.body.width, travel)
         self._beside = _placed(self._network, obstacle, car.lane_width)
 
     @cached_property

@@ -16,6 +16,8 @@ EDITION = 3
 Norm: docs/rules.md#edition.
 """
 
+SPARE = 0.02
+"""What is left beside who may get into the way in a tick, metres (docs/rules.md#room-aside)."""
 USUAL_W = 0.3
 """The half-lane width that the defaults of lengths are for, metres (docs/rules.md#scale)."""
 _IN_ORDER = (
@@ -189,6 +191,13 @@ class RuleParameters:
         values = tuple(rules.values())
         types = tuple(map(type, values))
         return _checked(tuple(rules), values, types) if _NUMBERS.issuperset(types) else _made(rules)
+
+    def width_needed(self, width: float, travel: float) -> float:
+        """Return how much of a right lane has to be free for a car (docs/rules.md#room-aside), metres.
+
+        The car is `width` m wide, and any point of another gets at most `travel` m in a tick.
+        """
+        return width + max(self.blocked_gap, travel + SPARE)
 
     def room_beyond(self, reach: float, bodies: int) -> float:
         """Return how far beyond a disc an exit has to be empty to be free (docs/rules.md#free-exit), metres.

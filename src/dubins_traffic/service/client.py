@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 from dubins_traffic.competition.competition import Competition
 from dubins_traffic.competition.submission import Bounds, folder_files
-from dubins_traffic.errors import DubinsTrafficError, InputError, MissingExtraError, shown
+from dubins_traffic.errors import DubinsTrafficError, InputError, needs, shown
 from dubins_traffic.files import read_bytes
 
 if TYPE_CHECKING:
@@ -61,10 +61,8 @@ class Connection:
     """
 
     def __init__(self, url: str, token: str = "") -> None:
-        try:
+        with needs("asking a service", "client"):
             import httpx
-        except ImportError as error:
-            raise MissingExtraError("asking a service", "client") from error
         if not url.startswith(("http://", "https://")):
             raise InputError(
                 "no address of a service", field="URL", value=url, expected="https://... or http://..."

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.errors import needs
 from dubins_traffic.runs.single import Result
 from dubins_traffic.sessions.plan import Pace, SessionPlan
 from dubins_traffic.transports.maestro import Maestro
@@ -18,10 +18,8 @@ def make_transport(
     domain: int | None, maestro: Maestro | None, *, here: bool = True, clock: bool = False
 ) -> Ros2:
     """Return the transport; MissingExtraError if the extra `ros2` is not installed."""
-    try:
+    with needs("ROS 2", "ros2"):
         from dubins_traffic.transports.ros2.transport import Ros2
-    except ImportError as error:
-        raise MissingExtraError("ROS 2", "ros2") from error
     return Ros2(domain, maestro=maestro, here=here, clock=clock)
 
 

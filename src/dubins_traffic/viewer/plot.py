@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 
 from dubins_traffic.cars.body import Car
-from dubins_traffic.errors import InputError, MissingExtraError
+from dubins_traffic.errors import InputError, needs
 from dubins_traffic.files import replace_file, require_output
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
@@ -139,10 +139,8 @@ def require_picture(
 
 
 def _matplotlib() -> Any:
-    try:
+    with needs("plotting", "plot"):
         return importlib.import_module("matplotlib")
-    except ImportError:
-        raise MissingExtraError("plotting", "plot") from None
 
 
 def _draw(subject: Subject | Run) -> Any:

@@ -11,7 +11,7 @@ from itertools import pairwise
 from typing import Any
 
 from dubins_traffic.campaign.report.comparison import RANKING, Comparison, Level, words
-from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.errors import needs
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.canvas import METADATA
@@ -203,7 +203,7 @@ def formula(comparison: Comparison, name: str, number: int) -> Chart:
         f"Verdicts on {name}",
         rows,
         FORMULA,
-        f"{_short(name)}: share of the trials",
+        f"{_short(name)}:\nshare of the trials",
         percent=True,
     )
 
@@ -288,13 +288,16 @@ def _short(name: str) -> str:
 
 
 def _legend(axes: Any, entries: int) -> None:
-    """Put the legend above the axes: on a narrow chart two entries in a row, long ones below one another."""
+    """Put the legend above the axes: on a narrow chart two entries in a row, long ones below one another.
+
+    On a narrow chart it ends where the axes end, since long names beside them leave it no room on their right.
+    """
     narrow = axes.figure.get_figwidth() <= NARROW
     longest = max((len(text) for text in axes.get_legend_handles_labels()[1]), default=0)
     most = (1 if longest > 16 else 2) if narrow else entries
     axes.legend(
-        loc="lower left",
-        bbox_to_anchor=(0.0, 1.0),
+        loc="lower right" if narrow else "lower left",
+        bbox_to_anchor=(1.0, 1.0) if narrow else (0.0, 1.0),
         ncols=most,
         frameon=False,
         handlelength=1.0,
@@ -345,10 +348,8 @@ def figures() -> tuple[Any, Any]:
     MissingExtraError
         Without the extra `campaign`.
     """
-    try:
+    with needs("a report", "campaign"):
         return import_module("matplotlib"), import_module("matplotlib.figure")
-    except ImportError as error:
-        raise MissingExtraError("a report", "campaign") from error
 
 
 def _themed(svg: str) -> str:

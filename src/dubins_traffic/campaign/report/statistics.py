@@ -18,7 +18,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from dubins_traffic.errors import MissingExtraError
+from dubins_traffic.errors import needs
 from dubins_traffic.kernels.arrays import Floats, Ints
 
 LEVEL = 0.95
@@ -154,10 +154,8 @@ def worth(values: Sequence[float]) -> float:
 
 def distributions(feature: str = "a report", extra: str = "campaign") -> Any:
     """Return scipy.stats; MissingExtraError names what needs it, and the extra that brings it."""
-    try:
+    with needs(feature, extra):
         return import_module("scipy.stats")
-    except ImportError as error:
-        raise MissingExtraError(feature, extra) from error
 
 
 @lru_cache(maxsize=4)

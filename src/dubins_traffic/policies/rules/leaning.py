@@ -13,7 +13,7 @@ from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
 from dubins_traffic.policies.rules.seeing import SIDE, is_by_disc_behind, way_to_go
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
-from dubins_traffic.policies.rules.turn_arcs import ReferencePath, on_way
+from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_lane, on_way
 from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.rules.propositions import FLAG
@@ -22,6 +22,9 @@ from dubins_traffic.rules.shape import half_across
 BESIDE_LINE = 1.5
 """So near to the disc at the end of its lane, metres, a car leans past an ego that stands beside the line. Farther back
 it goes by in the middle of its lane, where it has room to turn straight again."""
+
+EARLY = 0.8
+"""A car leans from this gap to a body on, metres: beside it a rectangle would have no room to turn."""
 
 
 @jit_inline
@@ -32,20 +35,20 @@ def leans(vehicle: Vehicle) -> bool:
 
 
 @jit_inline
-def lean(b: int, n: int, offset: float, way: ReferencePath, near: int, traffic: Traffic) -> float:
+def lean(b: int, n: int, offset: float, part: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
     """Return how far left of its way car n drives past the bodies left of it, 0 or less, metres; 0 while it passes.
 
-    `offset` (m) is where it would drive otherwise; `near` (count) cars are listed.
+    `offset` (m) is where it would drive otherwise, `part` of the way; `near` (count) cars are listed.
     """
     drivers = traffic.drivers
     free = near == 0 or offset != 0.0 or drivers.car[b, n].aside != 0.0
     free = free or not leans(drivers.vehicle[b]) or not may_lean(b, n, way, traffic)
-    return 0.0 if free else away_from(b, way, near, traffic)
+    return 0.0 if free else away_from(b, n, part, way, near, traffic)
 
 
 @jit_rare
 def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
-    """Tell whether a car may turn aside where it is: in a bend, between two, and toward a crossing past a standing ego.
+    """Tell whether a car may turn aside where it is: in a bend, on a road, and before a crossing past a standing ego.
 
     Near the crossing out of which it comes it may enter that anew. A rectangle that is tilted at a line may find no
     room to turn, so it does not lean there away from other e-agents, which drive on.
@@ -57,26 +60,25 @@ def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
     if disc >= 0 and int(roads.degree[first + disc]) < vehicle.degree:
         return True
     if lane < 0:
-        return False
+        return disc >= 0 and ego_stands_beside(b, drivers.car[b, n].lane, traffic)
     v = lane_end(roads, net, lane)
     begin, end = int(roads.degree[first + lane_start(roads, net, lane)]), int(roads.degree[first + v])
-    if disc < 0 and begin < vehicle.degree and end < vehicle.degree:
-        return True
-    if disc not in (-1, v) or is_by_disc_behind(b, n, way, traffic):
-        return False
     near = way_to_go(way, traffic.state.x[b, n], traffic.state.y[b, n]) > -(vehicle.disc + BESIDE_LINE)
-    return near and ego_stands_beside(b, n, traffic)
+    left_disc = begin < vehicle.degree or not is_by_disc_behind(b, n, way, traffic)
+    if disc < 0 and left_disc and (end < vehicle.degree or not near):
+        return True
+    return (near or not left_disc) and ego_stands_beside(b, lane, traffic)
 
 
 @jit_rare
-def ego_stands_beside(b: int, n: int, traffic: Traffic) -> bool:
-    """Tell whether the ego stands on the road of car n, in the other lane state."""
-    labels, lane = traffic.labels, int(traffic.labels.lane[b, n])
+def ego_stands_beside(b: int, lane: int, traffic: Traffic) -> bool:
+    """Tell whether the ego stands on the road of a lane, with the other lane state."""
+    labels = traffic.labels
     return labels.lane[b, EGO] == lane ^ 1 and np.int64(labels.bits[b, EGO]) & FLAG.STANDS != 0
 
 
 @jit_rare
-def away_from(b: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
+def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
     """Return how far left of its way a car keeps clear of the listed bodies beside its lane, 0 or less, metres.
 
     Those have their centres left of the centre line; who is ahead or behind in the lane is not passed by leaning. Its
@@ -84,10 +86,18 @@ def away_from(b: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
     """
     state, scratch, vehicle = traffic.state, traffic.scratch, traffic.drivers.vehicle[b]
     clear = vehicle.half_width + vehicle.rounding + travel_of(vehicle) + GUARD + SIDE
+    far = 2.0 * vehicle.reach + EARLY
     offset = 0.0
     for k in range(near):
         j = scratch.near[k]
+        dx, dy = state.x[b, j] - state.x[b, n], state.y[b, j] - state.y[b, n]
+        if dx * dx + dy * dy > far * far:
+            continue
         _, _, left, px, py = on_way(way, state.x[b, j], state.y[b, j])
+        if (
+            part == PART.BEFORE
+        ):  # a way that turns round would find who is beside the lane beside the lane back
+            _, _, left, px, py = on_lane(way, state.x[b, j], state.y[b, j])
         half = half_across(b, j, px, py, state, vehicle)
         if vehicle.middle < left < 4.0 * vehicle.middle:
             offset = min(offset, left - half - clear)

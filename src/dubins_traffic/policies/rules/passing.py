@@ -13,14 +13,15 @@ from dubins_traffic.policies.rules.abilities import PATIENT, turns_within_road
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_on_way, within_lane
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
+from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import INFINITE, lane_end
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import half_across
 
 PASSING_WAIT = 2.0
 """Seconds to wait behind what stands before passing it."""
-BERTH = 0.12
-"""Gap beside what is passed, metres."""
+BERTH, SPARES = 0.12, 0.02
+"""Gap beside what is passed, metres; and the least beyond what a car that stands may get in a tick."""
 SLIP = 0.25
 """A car begins to return this far past what it passes, metres, beyond the length of a rectangle."""
 BACK = 0.4
@@ -261,13 +262,15 @@ def extent(
 ) -> tuple[float, float, float]:
     """Return (end, left, right): where what stands ahead in the lane ends, and from where to where it reaches.
 
-    Both are metres left of the middle of the lane; on the right nobody passes a car.
+    Both are metres left of the middle of the lane; on the right nobody passes a car. Where ticks are long a car counts
+    as wider: so much that a gap of `BERTH` beside it is safe whatever it does in a tick, however it turns meanwhile.
     """
     state, labels, obstacles, scratch = traffic.state, traffic.labels, traffic.obstacles, traffic.scratch
     end = own - 1.0
     offset = -1.0
     low = INFINITE
     reach = vehicle.reach
+    wary = max(travel_of(vehicle) + GUARD + SPARES - BERTH, 0.0)
     before = end - 1.0
     while end > before:
         before = end
@@ -283,7 +286,8 @@ def extent(
                 and left < vehicle.middle
             ):
                 end = max(end, key)
-                offset = max(offset, left + half_across(b, j, way.tx, way.ty, state, vehicle))
+                half = reach if wary > 0.0 else half_across(b, j, way.tx, way.ty, state, vehicle)
+                offset = max(offset, left + half + wary)
                 low = -INFINITE
             j = scratch.link[j]
         for p in range(obstacles.off[b], obstacles.off[b + 1]):

@@ -167,7 +167,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     near = 0
     if not (free and not chooses and drivers.way[b, n].crossing != 0):
         near = gather(b, n, car.lane, x, y, way, traffic)
-    gap, who, close = look_ahead(b, part, key, left, x, y, way, near, traffic, vehicle, car)
+    gap, who, close = look_ahead(b, n, part, key, left, x, y, way, near, traffic, vehicle, car)
     rides = (
         car.violations & VIOLATION.TAILGATING != 0
         and outside
@@ -181,7 +181,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         speed, kept = follow(b, n, speed, gap, who, rides, part, way, traffic)
     speed = dawdle(b, n, speed, -way_to_go(way, x, y), near, traffic)
     speed, offset = pass_what_stands(b, n, speed, gap, kept, who, part, outside, way, near, traffic)
-    offset += lean(b, n, offset, way, near if close else 0, traffic)
+    offset += lean(b, n, offset, part, way, near, traffic)
     if leaves:
         find_way_out(b, n, tick, part, traffic)
     bend = way.bend if part == PART.THROUGH else 0.0

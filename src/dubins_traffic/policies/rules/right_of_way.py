@@ -93,8 +93,8 @@ def may_enter_bend(
 ) -> bool:
     """Tell whether a car may enter a bend or dead end: there is room behind it, and nobody in it is in its way.
 
-    An e-agent enters none that the ego's body meets (E4). Who turns round in one does it alone; who has waited for that
-    for long takes the way on.
+    An e-agent enters none that the ego's body meets (E4). Who turns round in one does it alone, unless he stands there;
+    who has waited for that for long takes the way on.
     """
     state, labels, roads, drivers, scratch = (
         traffic.state,
@@ -110,14 +110,15 @@ def may_enter_bend(
     hushed = is_hushed(tick, v, car, vehicle, drivers)
     inside = 0
     held = False
+    long = car.kind != KIND.ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
     for k in range(near):
         j = scratch.near[k]
         if labels.crosses[b, j] == v:
             inside += 1 if turns else shares_way(b, j, way, degree, state, vehicle)
-            held = held or hushed or (n != EGO and (j == EGO or turns_round(drivers.car[b, j])))
+            comes = turns_round(drivers.car[b, j]) and not (long and labels.bits[b, j] & FLAG.STANDS != 0)
+            held = held or hushed or (n != EGO and (j == EGO or comes))
         elif turns and degree > 1:
             held = held or comes_first(b, n, j, v, traffic)
-    long = car.kind != KIND.ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
     if held or (inside > 0 and (turns or degree != 2)):
         free = False
     else:

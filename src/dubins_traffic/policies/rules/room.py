@@ -9,7 +9,7 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.narrow import offset_in_lane
-from dubins_traffic.policies.rules.seeing import QUEUE_GAP, SIDE
+from dubins_traffic.policies.rules.seeing import BEYOND, FACING_GAP, QUEUE_GAP, SIDE
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
 from dubins_traffic.rules.exits import LaneOut, takes_lane
@@ -87,6 +87,8 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
                     return -1.0
                 if labels.bits[b, j] & FLAG.STANDS != 0 or heading < 0.0 or strange:
                     back = vehicle.backs_up if strange and crossing else 0.0
+                    if n == EGO and labels.lane[b, j] == out ^ 1:  # it has to go back, as in `has_to_go_back`
+                        back = FACING_GAP + BEYOND - QUEUE_GAP
                     wall = min(wall, along)
                     last = min(last, along - back - pitch)
             j = scratch.link[j]

@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 
-from dubins_traffic.cars.state import State
+from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
@@ -23,8 +23,9 @@ STANDING_GAP, NEAR_ENOUGH = 0.72, 1.4
 """Gap kept behind what stands where there is room: enough to pull out, and for the e-agent of 2016 to drive off; and
 the largest distance between centres, at which it still counts as blocking the lane, metres.
 """
-FACING_GAP = 0.8
-"""Gap kept from an oncoming car, metres; a car on the left has to return, and goes closer."""
+FACING_GAP, BEYOND = 0.8, 0.02
+"""Gap kept from an oncoming car, metres, by an ego even this much more if that car is left: nearer by it would count as
+what keeps the car from going back (E5); a car on the left has to return, and goes closer."""
 OBSTACLE_GAP = 0.04
 """Gap kept in a disc from an obstacle behind the disc, metres: it never moves, and a car near it may then pass it."""
 CLOSE_GAP = 0.06
@@ -127,6 +128,7 @@ def add_segment(segment: int, n: int, count: int, scratch: Scratch) -> int:
 @jit_inline
 def look_ahead(
     b: int,
+    n: int,
     part: int,
     key: float,
     left: float,
@@ -140,7 +142,7 @@ def look_ahead(
 ) -> tuple[float, int, bool]:
     """Return (gap, who, close): the first thing ahead on the way, and whether anything is close.
 
-    `who` is a car, or -2 - p for obstacle part p.
+    `who` is a car, or -2 - p for obstacle part p. The gap to a car that `has_to_go_back` is less `FACING_GAP`.
     """
     state, labels, obstacles, scratch = traffic.state, traffic.labels, traffic.obstacles, traffic.scratch
     reach = vehicle.reach
@@ -174,10 +176,20 @@ def look_ahead(
         if there - part == 2:
             far = max(far, its_key - key + around(way))
         its_gap = far - 2.0 * reach
+        if has_to_go_back(b, n, j, labels, car):
+            its_gap -= FACING_GAP
         if its_gap < gap:
             gap = its_gap
             who = j
     return see_obstacles(b, part, key, x, y, way, low, high, gap, who, close, obstacles, vehicle, car)
+
+
+@jit_inline
+def has_to_go_back(b: int, n: int, j: int, labels: Labels, car: Driver) -> bool:
+    """Tell whether car `j` comes toward the ego n on the ego's side of the road (docs/rules.md#moving-up)."""
+    its, own = np.int64(labels.bits[b, j]), np.int64(labels.bits[b, n])
+    comes = car.kind == KIND.ROUND and labels.lane[b, j] == car.lane ^ 1 and labels.crosses[b, n] < 0
+    return comes and its & FLAG.LEFT != 0 and own & FLAG.LEFT == 0
 
 
 @jit_inline
@@ -249,12 +261,16 @@ def wanted_gap(
     state, labels = traffic.state, traffic.labels
     if who == -1:
         return 0.0
-    standing = max(min(STANDING_GAP, NEAR_ENOUGH - 2.0 * reach), QUEUE_GAP)
+    # Inside a curve s, along the centre line, grows by more than the distance along the lane.
+    near_enough = NEAR_ENOUGH * (1.0 - traffic.scratch.tight[0])
+    standing = max(min(STANDING_GAP, near_enough - 2.0 * reach), QUEUE_GAP)
     if labels.bits[b, n] & FLAG.LEFT != 0:
         standing = QUEUE_GAP
     if who < -1:
         near = labels.crosses[b, n] >= 0 or is_by_disc_behind(b, n, way, traffic)
         return OBSTACLE_GAP if near else standing
+    if has_to_go_back(b, n, who, labels, car):
+        return BEYOND
     if car.violations & VIOLATION.TAILGATING != 0:
         return CLOSE_GAP
     its = np.int64(labels.bits[b, who])

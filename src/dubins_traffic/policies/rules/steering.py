@@ -16,7 +16,7 @@ from dubins_traffic.policies.rules.returning import NARROWLY, last_return
 from dubins_traffic.policies.rules.standing import may_drive_on, stays_right
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
-from dubins_traffic.policies.safety import may_hit, may_meet
+from dubins_traffic.policies.safety import may_hit, may_meet, travel_of
 from dubins_traffic.rules.propositions import FLAG
 
 HURRY, WIDE = 0.25, 0.4
@@ -267,9 +267,7 @@ def is_safe_from(
 ) -> bool:
     """Do as `is_safe`, of a car at a pose; `near` (count) cars are listed, `trusted` (index) need not be minded."""
     state, obstacles, scratch = traffic.state, traffic.obstacles, traffic.scratch
-    travel = vehicle.fastest * vehicle.period
-    if vehicle.half_length > 0.0:
-        travel += vehicle.yaw_most * vehicle.reach * vehicle.period
+    travel = travel_of(vehicle)
     for k in range(near):
         j = scratch.near[k]
         other = Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])

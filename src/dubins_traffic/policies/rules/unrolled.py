@@ -20,7 +20,7 @@ from dubins_traffic.kernels.records import Rows
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.standing import LINE, SURE
 from dubins_traffic.policies.rules.tables import VIOLATION, Traffic
-from dubins_traffic.policies.safety import NEAR, may_hit, may_meet
+from dubins_traffic.policies.safety import NEAR, may_hit, may_meet, travel_of
 from dubins_traffic.roads.lookup import (
     bends_before,
     bent_distance2,
@@ -241,9 +241,7 @@ def keeps_right(b: int, n: int, pose: Pose, command: Command, watched: int, traf
 def is_safe(b: int, n: int, pose: Pose, command: Command, traffic: Traffic) -> bool:
     """Tell whether a command can't bring about a contact, whatever other cars do in this tick."""
     state, vehicle = traffic.state, traffic.drivers.vehicle[b]
-    travel = vehicle.fastest * vehicle.period
-    if vehicle.half_length > 0.0:
-        travel += vehicle.yaw_most * vehicle.reach * vehicle.period
+    travel = travel_of(vehicle)
     for j in range(state.count[b]):
         other = Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
         if j != n and may_meet(pose, command, vehicle, other, travel):
