@@ -164,6 +164,21 @@ def test_a_form_without_its_hidden_field_is_refused(world: World) -> None:
     assert answer.status_code == 403
 
 
+@pytest.mark.parametrize("role", [TEAM, ORGANISER])
+def test_an_invitation_ends_when_it_is_revoked(world: World, role: str) -> None:
+    team, page = world.people[TEAM], "/team" if role == TEAM else "/desk"
+    code = shown_secret(team.post("/team/invite", form="/team"))
+    number = max(
+        map(int, re.findall(rf'"{page}/invitations/(\d+)/revoke"', world.people[role].get(page).text))
+    )
+    other = world.people[OTHER].post(f"/team/invitations/{number}/revoke", form="/team")
+    assert other.status_code == 400
+    assert world.people[role].post(f"{page}/invitations/{number}/revoke", form=page).status_code == 303
+    assert f"/invitations/{number}/" not in team.get("/team").text
+    entry = {"code": code, "name": "Eve", "password": "correct horse"}
+    assert "used" in world.service.person().post("/join", form="/join", **entry).text
+
+
 def test_a_worker_s_token_ends_when_it_is_revoked(world: World) -> None:
     organiser, stolen = world.people[ORGANISER], world.service.person()
     stolen.token = shown_secret(organiser.post("/desk/worker", form="/desk", name="a laptop"))
