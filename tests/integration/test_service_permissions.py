@@ -46,6 +46,7 @@ ROUTES: dict[tuple[str, str], tuple[str, set[str]]] = {
     ("GET", "/team"): ("/team", PEOPLE),
     ("POST", "/team/found"): ("/team/found", PEOPLE),
     ("POST", "/team/invite"): ("/team/invite", PEOPLE),
+    ("POST", "/team/invitations/{number:int}/revoke"): ("/team/invitations/999/revoke", PEOPLE),
     ("POST", "/team/tokens"): ("/team/tokens", PEOPLE),
     ("POST", "/team/tokens/{number:int}/revoke"): ("/team/tokens/999/revoke", PEOPLE),
     ("POST", "/team/password"): ("/team/password", PEOPLE),
@@ -53,6 +54,7 @@ ROUTES: dict[tuple[str, str], tuple[str, set[str]]] = {
     ("GET", "/desk"): ("/desk", {ORGANISER}),
     ("POST", "/desk/create"): ("/desk/create", {ORGANISER}),
     ("POST", "/desk/invite"): ("/desk/invite", {ORGANISER}),
+    ("POST", "/desk/invitations/{number:int}/revoke"): ("/desk/invitations/999/revoke", {ORGANISER}),
     ("POST", "/desk/worker"): ("/desk/worker", {ORGANISER}),
     ("POST", "/desk/worker/{number:int}/revoke"): ("/desk/worker/999/revoke", {ORGANISER}),
     ("POST", "/desk/accounts/{number:int}/reset"): ("/desk/accounts/2/reset", {ORGANISER}),
@@ -160,6 +162,21 @@ def test_who_may_use_a_route(world: World, route: tuple[str, str], role: str) ->
 def test_a_form_without_its_hidden_field_is_refused(world: World) -> None:
     answer = world.people[ORGANISER].http.post("/desk/invite", data={"role": "organiser"})
     assert answer.status_code == 403
+
+
+@pytest.mark.parametrize("role", [TEAM, ORGANISER])
+def test_an_invitation_ends_when_it_is_revoked(world: World, role: str) -> None:
+    team, page = world.people[TEAM], "/team" if role == TEAM else "/desk"
+    code = shown_secret(team.post("/team/invite", form="/team"))
+    number = max(
+        map(int, re.findall(rf'"{page}/invitations/(\d+)/revoke"', world.people[role].get(page).text))
+    )
+    other = world.people[OTHER].post(f"/team/invitations/{number}/revoke", form="/team")
+    assert other.status_code == 400
+    assert world.people[role].post(f"{page}/invitations/{number}/revoke", form=page).status_code == 303
+    assert f"/invitations/{number}/" not in team.get("/team").text
+    entry = {"code": code, "name": "Eve", "password": "correct horse"}
+    assert "used" in world.service.person().post("/join", form="/join", **entry).text
 
 
 def test_a_worker_s_token_ends_when_it_is_revoked(world: World) -> None:

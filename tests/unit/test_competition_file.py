@@ -134,3 +134,19 @@ def test_documents_are_kept_apart_from_what_they_were_made_of() -> None:
     found = Competition.from_document(source)
     source["title"] = "other"
     assert found.document["title"] == "Small"
+
+
+def test_a_trial_that_sleeps_is_waited_for_no_longer_than_two_minutes() -> None:
+    """It was ten minutes, for which a worker did nothing else."""
+    found = competition().phase("practice").model.limits
+    assert [found.of(duration).wall_seconds for duration in (5.0, 40.0, 1000.0)] == [30.0, 80.0, 120.0]
+    own = competition(**phases(limits={"wall": 7.0})).phase("test")
+    assert own.limits(own.instance(0, 1)).wall_seconds == 7.0
+
+
+def test_a_phase_that_sets_no_quota_has_one() -> None:
+    text = {name: value for name, value in PRACTICE.items() if name != "quota"}
+    practice = competition(phases={"practice": text}).phase("practice")
+    assert practice.quota.a_day is not None
+    assert practice.quota.queued is not None
+    assert competition(**phases(quota={"total": 3})).phase("test").quota.queued is None

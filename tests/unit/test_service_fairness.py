@@ -44,7 +44,7 @@ def joined(service: Service, name: str = "Ann", team: str = "Ants") -> Account:
     """Let a person join with a team of its own."""
     with service.database.writing() as session:
         code = accounts.invite(session, accounts.PARTICIPANT, None, NOW)
-        return accounts.register(session, code, name, "correct horse", team, NOW)
+    return accounts.join(service.database, code, name, "correct horse", team, NOW)
 
 
 def handed(
@@ -57,7 +57,7 @@ def handed(
 
 def checked(session: Session, submission: Submission, trials: int = 12) -> None:
     """Let the check of a submission be done, and its trials wait."""
-    queue.drop(session, submission)
+    queue.drop(session, submission, NOW)
     submission.content = submission.digest
     submissions.accept(session, submission, range(trials), NOW)
 
@@ -182,7 +182,7 @@ def test_a_chunk_that_takes_long_is_reported_in_parts_and_others_come_between(se
         checked(session, slow)
         chunk = taken(session)
         other = handed(session, service, bob, "other")
-        submissions.record(session, chunk, results([0, 1]), NOW, NOTHING)
+        submissions.record(session, chunk, results([0, 1]), NOW + 1.0, NOTHING)
         assert taken(session).submission_id == other.id
         while (next_one := queue.take(session, "w", NOW, 60.0)) is not None:
             submissions.record(session, next_one, results(next_one.numbers), NOW, NOTHING)

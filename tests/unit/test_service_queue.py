@@ -15,7 +15,16 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, queue, submissions
 from dubins_traffic.service.database import Database
-from dubins_traffic.service.database_tables import Account, Act, Chunk, Competition, Phase, Submission, Trial
+from dubins_traffic.service.database_tables import (
+    Account,
+    Act,
+    Chunk,
+    Competition,
+    Phase,
+    Submission,
+    Team,
+    Trial,
+)
 from dubins_traffic.service.hiding import NOTHING
 from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import RefusedError, Upload
@@ -68,7 +77,7 @@ def checked(session: Session, submission: Submission, trials: int = 20) -> None:
     """Take the check of a submission from the queue, and accept it."""
     chunk = session.scalars(select(Chunk).where(Chunk.submission_id == submission.id)).one()
     chunk.state, chunk.token = "leased", 1
-    queue.finish(session, chunk)
+    queue.finish(session, chunk, 20.0)
     submission.content = submission.digest
     submissions.accept(session, submission, range(trials), 20.0)
 
@@ -100,12 +109,12 @@ def test_the_queue_goes_round_the_teams(database: Database) -> None:
         assert [chunk and chunk.team_id for chunk in served] == [people[0].team_id] * 3
         late = sent(session, phase, people[1], "late")
         other = sent(session, phase, people[2], "other")
-        assert queue.places(session)[late.id] == 1
-        assert queue.places(session)[other.id] == 2
+        assert queue.places(session, 30.0)[late.id] == 1
+        assert queue.places(session, 30.0)[other.id] == 2
         nearest = queue.take(session, "w", 30.0, 60.0)
         assert nearest is not None
         assert nearest.submission_id == late.id
-        assert queue.places(session)[other.id] == 1
+        assert queue.places(session, 30.0)[other.id] == 1
 
 
 def test_places_are_those_in_which_chunks_are_served(database: Database) -> None:
@@ -114,7 +123,7 @@ def test_places_are_those_in_which_chunks_are_served(database: Database) -> None
         for account, count in zip(people, (3, 1, 2), strict=True):
             for number in range(count):
                 checked(session, sent(session, phase, account, f"{number}"))
-        foretold = dict(queue.places(session))
+        foretold = dict(queue.places(session, 30.0))
         order: list[int] = []
         while (chunk := queue.take(session, "w", 30.0, 60.0)) is not None:
             order.append(chunk.submission_id)
@@ -386,3 +395,68 @@ def test_the_tables_are_those_of_the_migrations(database: Database) -> None:
 
     with database.engine.connect() as connection:
         assert compare_metadata(MigrationContext.configure(connection), Base.metadata) == []
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_who_sleeps_has_no_more_than_a_share_of_the_time(database: Database, workers: int) -> None:
+    """Another team's first result took nine times as long as alone, when turns were counted in chunks.
+
+    Time is told by what is served: a trial of the sleepers takes 20 s, one of the other team 1 s.
+    """
+    slow, quick, trials = 20.0, 1.0, 30
+    with database.writing() as session:
+        phase, people = furnished(session, teams=2)
+        for number in range(6):
+            checked(session, sent(session, phase, people[0], f"sleeps {number}"), trials)
+        late: Submission | None = None
+        at, busy = 30.0, list[tuple[float, Chunk, int]]()
+        began = 0.0
+        while late is None or late.state != "scoring":
+            while len(busy) < workers and (chunk := queue.take(session, "w", at, 600.0)) is not None:
+                submissions.taken(chunk.submission, chunk, at)
+                each = slow if chunk.team_id == people[0].team_id else quick
+                busy.append((at + each, chunk, 1))
+            at, chunk, done = min(busy, key=lambda one: one[0])
+            busy.remove((at, chunk, done))
+            if chunk.kind == "check":
+                queue.finish(session, chunk, at)
+                chunk.submission.content = chunk.submission.digest
+                submissions.accept(session, chunk.submission, range(trials), at)
+            else:
+                submissions.record(session, chunk, results(chunk)[:done], at, NOTHING)
+            if late is None and at >= 90.0:
+                late, began = sent(session, phase, people[1], "quick", at), at
+        alone = quick * (trials + 2) / workers
+        assert at - began <= 3.0 * alone + slow
+
+
+def test_a_team_that_was_idle_has_saved_nothing_and_owes_nothing(database: Database) -> None:
+    with database.writing() as session:
+        phase, people = furnished(session, teams=2)
+        first, second = (session.get_one(Team, account.team_id) for account in people)
+        first.turn, second.turn = 5000.0, 100.0
+        sent(session, phase, people[0], "x")
+        chunk = queue.take(session, "w", 30.0, 600.0)
+        assert chunk is not None
+        sent(session, phase, people[1], "y", 70.0)
+        assert (first.turn, second.turn) == (5000.0, 5040.0)
+        queue.release(session, chunk, "silent", 90.0)
+        assert first.turn == 5060.0
+        queue.drop(session, chunk.submission, 95.0)
+        assert first.turn == 5060.0
+
+
+def test_what_runs_again_is_done_before_the_team_s_next_submission(database: Database) -> None:
+    """Of six submissions the first was finished after all trials of the last."""
+    with database.writing() as session:
+        phase, people = furnished(session, teams=1)
+        own = [sent(session, phase, people[0], f"{number}") for number in range(3)]
+        for submission in own:
+            checked(session, submission)
+        finished: list[int] = []
+        while (chunk := queue.take(session, "w", 30.0, 60.0)) is not None:
+            assert [one.state for one in own].count("scoring") == own.index(chunk.submission)
+            submissions.record(session, chunk, results(chunk), 30.0, NOTHING)
+            if chunk.submission.state == "scoring":
+                finished.append(chunk.submission_id)
+        assert finished == [submission.id for submission in own]

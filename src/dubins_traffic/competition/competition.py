@@ -31,6 +31,8 @@ MOST_TRIALS = 100_000
 """Most trials of a phase, all configurations together."""
 SECRET = "secret"
 """In place of a seed: the seeds are drawn by `dubins-traffic competition seal`, and nobody knows them."""
+WALL_S = (30.0, 120.0)
+"""Least and most of twice the duration of a trial, which is its limit of wall-clock time unless a phase sets one."""
 UTC_TIME = "a time in UTC, as 2027-03-01T12:00:00Z"
 
 
@@ -73,9 +75,10 @@ class LimitsTable(Strict):
     bank: Annotated[float, Field(ge=0, le=limits.SECONDS)] = Field(
         default=10.0, description="processor time a trial for decisions that take longer, s"
     )
-    wall: Seconds = Field(
-        default=600.0,
-        description="wall-clock time beyond five times its processor time, s: for those that sleep",
+    wall: Seconds | None = Field(
+        default=None,
+        description="wall-clock time beyond five times its processor time, s: for those that sleep; left out: twice "
+        "the duration of the trial, 30 at least and 120 at most",
     )
     memory: Annotated[int, Field(ge=16, le=1_000_000)] = Field(default=1024, description="memory, MiB")
     processes: Annotated[int, Field(ge=1, le=10_000)] = Field(
@@ -88,11 +91,11 @@ class LimitsTable(Strict):
         default=256, description="what it may print in a trial, KiB; the last 8 KiB are kept"
     )
 
-    @property
-    def value(self) -> Limits:
-        """What a box takes: seconds and bytes."""
+    def of(self, duration: float) -> Limits:
+        """Return what a box takes, seconds and bytes, for a trial that lasts so many seconds."""
+        wall = min(max(2.0 * duration, WALL_S[0]), WALL_S[1]) if self.wall is None else self.wall
         return Limits(
-            self.start, self.decision, self.bank, self.wall, memory=self.memory * MIB, processes=self.processes,
+            self.start, self.decision, self.bank, wall, memory=self.memory * MIB, processes=self.processes,
             files=self.files * MIB, output=self.output * KIB,
         )  # fmt: skip
 
@@ -103,6 +106,10 @@ class Quota(Strict):
     a_day: Count | None = Field(default=None, description="submissions in a day, from 0:00 UTC")
     total: Count | None = Field(default=None, description="submissions in the phase")
     queued: Count | None = Field(default=None, description="submissions that wait or run at a time")
+
+
+QUOTA = Quota(a_day=100, queued=20)
+"""Of a phase that sets none."""
 
 
 class PhaseModel(Strict):
@@ -135,7 +142,10 @@ class PhaseModel(Strict):
         default=20, description="lines of the log's tail that are shown with aggregates"
     )
     limits: LimitsTable = Field(default=LimitsTable(), description="what a submission may use in one trial")
-    quota: Quota = Field(default=Quota(), description="how often a team may submit")
+    quota: Quota = Field(
+        default=QUOTA,
+        description=f"how often a team may submit; left out: {QUOTA.a_day} a day, {QUOTA.queued} that wait or run",
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> PhaseModel:
@@ -214,11 +224,6 @@ class Phase:
     def closes(self) -> datetime | None:
         """What is received before this time counts; None: for ever."""
         return self.model.closes
-
-    @property
-    def limits(self) -> Limits:
-        """What a submission may use in one trial."""
-        return self.model.limits.value
 
     @property
     def quota(self) -> Quota:
@@ -305,6 +310,10 @@ class Phase:
         """Return what trial `number` is drawn to be from its seed."""
         named, trial = self.place(number)
         return draw(named.configuration, seed, trial)
+
+    def limits(self, instance: Instance) -> Limits:
+        """Return what a submission may use in a trial."""
+        return self.model.limits.of(instance.duration)
 
 
 @dataclass(frozen=True, slots=True)

@@ -170,7 +170,7 @@ def _judged(
         instance = phase.instance(number, seed)
     except InputError as error:
         return _failed(number, f"it can't be drawn: {error}")
-    seat = boxed_controller(str(submission.path), phase.limits, trust=trust)
+    seat = boxed_controller(str(submission.path), phase.limits(instance), trust=trust)
     name = registry.sandboxed(submission.digest[:12], TRUST if trust else "")
     recorded = io.BytesIO()
     memory = (RecordEncoder(recorded, header.encode(instance, name)),) if remember else ()

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import os
 import shlex
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -102,7 +103,7 @@ def command_line(
     dropped = [*_setpriv(), *outer]
     if not steps:
         return _entered(dropped, doors, ())
-    return ["unshare", "--mount", "--propagation", "private", "--", *_entered(dropped, doors, steps)]
+    return [_tool("unshare"), "--mount", "--propagation", "private", "--", *_entered(dropped, doors, steps)]
 
 
 def outside(program: Program, word: str) -> str:
@@ -115,10 +116,15 @@ def outside(program: Program, word: str) -> str:
     return word
 
 
+def _tool(name: str) -> str:
+    """Return where a tool lies: what begins a box has the system's PATH, since its first process shows it."""
+    return shutil.which(name) or name
+
+
 def _setpriv() -> list[str]:
     user = str(FIRST_USER + (os.getpid() % (1 << 22)) * 64 + next(_numbers) % 64)
     drop = ["--clear-groups", "--inh-caps=-all", "--bounding-set=-all", "--no-new-privs"]
-    return ["setpriv", f"--reuid={user}", f"--regid={user}", *drop, "--"]
+    return [_tool("setpriv"), f"--reuid={user}", f"--regid={user}", *drop, "--"]
 
 
 def _entered(command: Sequence[str], doors: Sequence[str], steps: Sequence[str]) -> list[str]:
@@ -192,7 +198,7 @@ def _entry(program: Program) -> list[str]:
 
 def _bubblewrap(program: Program, shown: Sequence[Shown], limits: Limits, layers: Layers) -> list[str]:
     """Return the command line of bubblewrap up to the program."""
-    words = ["bwrap", "--unshare-user", "--unshare-uts", "--hostname", "box", "--unshare-cgroup-try"]
+    words = [_tool("bwrap"), "--unshare-user", "--unshare-uts", "--hostname", "box", "--unshare-cgroup-try"]
     words += ["--uid", str(USER), "--gid", str(USER), "--die-with-parent", "--new-session"]
     for option, on in (("net", NETWORK in layers), ("pid", PIDS in layers), ("ipc", IPC in layers)):
         words += [f"--unshare-{option}"] if on else []

@@ -20,7 +20,7 @@ from time import clock_gettime, monotonic
 from typing import Final
 
 from dubins_traffic.sandbox import cgroups, seccomp
-from dubins_traffic.sandbox.launch import Program, command_line, outside
+from dubins_traffic.sandbox.launch import SYSTEM, Program, command_line, outside
 from dubins_traffic.sandbox.layers import CLOCK, ENVIRONMENT, MEMORY, PROCESSES, SECCOMP, Layers
 from dubins_traffic.sandbox.limits import Limits
 
@@ -335,9 +335,9 @@ def _groups(layers: Layers) -> cgroups.Trees:
 
 
 def _environment(program: Program, layers: Layers) -> dict[str, str]:
-    base = {"PATH": os.environ.get("PATH", os.defpath)} if ENVIRONMENT in layers else dict(os.environ)
     if layers.boxes:
-        return base
+        return {"PATH": SYSTEM} if ENVIRONMENT in layers else dict(os.environ)
+    base = {"PATH": os.environ.get("PATH", os.defpath)} if ENVIRONMENT in layers else dict(os.environ)
     more = {name: outside(program, value) for name, value in program.environment.items()}
     return base | {"HOME": "/tmp", "LANG": "C.UTF-8", **more}
 

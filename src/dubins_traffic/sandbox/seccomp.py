@@ -18,7 +18,7 @@ ALLOWED: Final = """
     pipe pipe2 open openat openat2 creat access faccessat faccessat2 stat fstat lstat newfstatat statx statfs fstatfs
     readlink readlinkat getcwd chdir fchdir getdents getdents64 mkdir mkdirat rmdir unlink unlinkat rename renameat
     renameat2 link linkat symlink symlinkat truncate ftruncate fallocate fsync fdatasync sync_file_range umask chmod
-    fchmod fchmodat utime utimes utimensat futimesat fadvise64 readahead copy_file_range sendfile splice tee flock
+    fchmod fchmodat utime utimes utimensat futimesat fadvise64 readahead copy_file_range sendfile splice tee
     getxattr lgetxattr fgetxattr listxattr llistxattr flistxattr
     select pselect6 poll ppoll epoll_create epoll_create1 epoll_ctl epoll_wait epoll_pwait epoll_pwait2 eventfd eventfd2
     timerfd_create timerfd_settime timerfd_gettime inotify_init inotify_init1 inotify_add_watch inotify_rm_watch
@@ -32,16 +32,18 @@ ALLOWED: Final = """
     nanosleep clock_nanosleep clock_gettime clock_getres gettimeofday time times timer_create timer_settime
     timer_gettime timer_getoverrun timer_delete
     getuid geteuid getgid getegid getresuid getresgid getgroups getrlimit setrlimit prlimit64 getrusage sysinfo uname
-    getrandom capget fcntl recvfrom recvmsg sendto sendmsg shutdown getsockname getpeername getsockopt setsockopt
+    getrandom capget recvfrom recvmsg sendto sendmsg shutdown getsockname getpeername getsockopt setsockopt
 """
 """What programs need that compute, read and write files of their own, and begin threads and processes."""
 
 NAMESPACES: Final = 0x7E020080
 """The flags of `clone` for new namespaces: time, mount, cgroup, uts, ipc, user, pid, net."""
-BUFFERS: Final = ("fcntl", "inotify_init", "inotify_init1", "sendmsg", "setsockopt")
+BUFFERS: Final = ("inotify_init", "inotify_init1", "sendmsg", "setsockopt")
 """Calls by which the kernel can be made to hold more than is seen."""
-FCNTL: Final = (*range(6), *range(8, 15), *range(1024, 1031), 1032, 1034)
-"""What `fcntl` may be asked for then: neither for the size of a pipe nor for a lock."""
+FCNTL: Final = (*range(5), *range(8, 15), *range(1024, 1031), 1032, 1034)
+"""What `fcntl` may be asked for: no lock, by which boxes could tell each other something over a file that both see."""
+PIPE_SIZE: Final = 1031
+"""What it may be asked for besides unless `BUFFERS` are kept from a program."""
 AF_UNIX: Final = 1
 SIGCHLD: Final = 17
 SIGNALS: Final = 64
@@ -86,7 +88,7 @@ def program(*, counts_children: bool = False, counts_buffers: bool = False) -> b
     counts_buffers : bool
         Whether memory is counted by what processes hold, and what pipes and sockets may hold in the kernel with it:
         then these keep the sizes that they begin with, each is held by a descriptor (`ProcessClocks.buffers`) and none
-        by a message alone, and there are no queues of notices and no locks of parts of files, which nobody could count.
+        by a message alone, and there are no queues of notices, which nobody could count.
 
     Raises
     ------
@@ -100,9 +102,8 @@ def program(*, counts_children: bool = False, counts_buffers: bool = False) -> b
     for name in ALLOWED.split():
         if not (counts_buffers and name in BUFFERS):
             _allow(library, made, name)
-    if counts_buffers:
-        for number in FCNTL:
-            _allow(library, made, "fcntl", library.Arg(1, library.EQ, number))
+    for number in FCNTL if counts_buffers else (*FCNTL, PIPE_SIZE):
+        _allow(library, made, "fcntl", library.Arg(1, library.EQ, number))
     _allow(library, made, "clone", library.Arg(0, library.MASKED_EQ, NAMESPACES, 0))
     _allow(library, made, "socketpair", library.Arg(0, library.EQ, AF_UNIX))
     _allow(library, made, "personality", library.Arg(0, library.EQ, PERSONALITY_AS_IT_IS))

@@ -75,6 +75,9 @@ class Baits:
         self._begin_process()
         os.environ[VARIABLE] = self.secret
         self._held.callback(os.environ.pop, VARIABLE, None)
+        path = os.environ.get("PATH", os.defpath)
+        os.environ["PATH"] = f"{path}{os.pathsep}/{self.secret}"
+        self._held.callback(os.environ.__setitem__, "PATH", path)
 
     def _begin_process(self) -> None:
         code = "import sys; sys.stdin.read()"
@@ -106,6 +109,7 @@ class Baits:
             "shared": self.shared,
             "process": self.process.pid,
             "worker": os.getpid(),
+            "host": socket.gethostname(),
             "daemon": self.daemon,
         }
 

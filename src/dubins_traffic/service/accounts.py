@@ -5,16 +5,18 @@ from __future__ import annotations
 import hashlib
 import re
 import secrets
+import threading
 import unicodedata
 from collections.abc import Sequence
 from functools import cache
 
 from argon2 import PasswordHasher
 from argon2.exceptions import InvalidHashError, VerificationError
-from sqlalchemy import select
+from sqlalchemy import ColumnElement, or_, select, update
 from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.service.database import Database
 from dubins_traffic.service.database_tables import Account, Act, Code, Team, Token
 
 ORGANISER, PARTICIPANT = "organiser", "participant"
@@ -53,9 +55,22 @@ def _checked_password(password: str) -> str:
     return password
 
 
+HASHES = threading.BoundedSemaphore(2)
+"""So many passwords are hashed at once: each takes a processor and 64 MiB for a while."""
+
+
 @cache
 def _hasher() -> PasswordHasher:
     return PasswordHasher()
+
+
+def hashed(password: str) -> str:
+    """Return a new password as it is kept. It takes its time, so no writer does it: others wait for a writer.
+
+    WrongEntryError if it is too short or too long.
+    """
+    with HASHES:
+        return _hasher().hash(_checked_password(password))
 
 
 @cache
@@ -69,8 +84,8 @@ def digest_of(secret: str) -> str:
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
-def invite(session: Session, role: str, team: Team | None, at: float) -> str:
-    """Return a new code by which one person can register, for a team or for none yet."""
+def invite(session: Session, role: str, team: Team | None, at: float, *, by: Account | None = None) -> str:
+    """Return a new code by which one person can register, for a team or for none yet; `by` is who invites."""
     code = secrets.token_urlsafe(32)
     session.add(
         Code(
@@ -78,27 +93,52 @@ def invite(session: Session, role: str, team: Team | None, at: float) -> str:
             kind="invitation",
             role=role,
             team_id=team and team.id,
+            made_by=by and by.id,
             expires=at + INVITATION_S,
         )
     )
     return code
 
 
-def _use(session: Session, code: str, kind: str, at: float) -> Code:
+def invitations(session: Session, at: float, team_id: int | None = None) -> Sequence[Code]:
+    """Return the invitations that are good: those to a team, else all."""
+    query = select(Code).where(Code.kind == "invitation", Code.used.is_(None), Code.expires > at)
+    if team_id is not None:
+        query = query.where(Code.team_id == team_id)
+    return session.scalars(query.order_by(Code.id)).all()
+
+
+def revoke_invitation(session: Session, number: int, at: float, team_id: int | None = None) -> None:
+    """End an invitation, of a team if one is given; WrongEntryError if it has none that is good."""
+    code = next((one for one in invitations(session, at, team_id) if one.id == number), None)
+    if code is None:
+        raise WrongEntryError("invitation: unknown, used or expired")
+    code.used = at
+
+
+def _good(session: Session, code: str, kind: str, at: float) -> Code:
     query = select(Code).where(Code.digest == digest_of(code.strip()), Code.kind == kind)
     row = session.scalars(query).first()
     if row is None or row.used is not None or row.expires <= at:
         raise WrongEntryError("code: unknown, used or expired; ask the organiser for another")
-    row.used = at
     return row
 
 
-def register(session: Session, code: str, name: str, password: str, team: str, at: float) -> Account:
+def join(database: Database, code: str, name: str, password: str, team: str, at: float) -> Account:
     """Make the account of a person who was invited; `team` names the team to found, if the code is for none.
 
     WrongEntryError if the code is not good, or a name or the password is not.
     """
-    invitation = _use(session, code, "invitation", at)
+    with database.reading() as session:  # who has no code costs no hash
+        _good(session, code, "invitation", at)
+    kept = hashed(password)
+    with database.writing() as session:
+        return _register(session, code, name, kept, team, at)
+
+
+def _register(session: Session, code: str, name: str, password: str, team: str, at: float) -> Account:
+    invitation = _good(session, code, "invitation", at)
+    invitation.used = at
     name = clean_name(name, "name")
     if RESERVED.fullmatch(name) or name.casefold() in map(
         str.casefold, session.scalars(select(Account.name))
@@ -106,7 +146,7 @@ def register(session: Session, code: str, name: str, password: str, team: str, a
         raise WrongEntryError("name: taken")
     account = Account(
         name=name,
-        password=_hasher().hash(_checked_password(password)),
+        password=password,
         role=invitation.role or PARTICIPANT,
         team_id=invitation.team_id,
         created=at,
@@ -136,7 +176,8 @@ def verified(session: Session, name: str, password: str) -> Account | None:
     account_id = next((number for number, known in there if known.casefold() == wanted), None)
     account = None if account_id is None else session.get(Account, account_id)
     try:
-        _hasher().verify(_nobody() if account is None else account.password, password[:LONGEST_PASSWORD])
+        with HASHES:
+            _hasher().verify(_nobody() if account is None else account.password, password[:LONGEST_PASSWORD])
     except (VerificationError, InvalidHashError):
         return None
     return account
@@ -149,25 +190,40 @@ def offer_reset(session: Session, account: Account, at: float) -> str:
     return code
 
 
-def reset(session: Session, code: str, password: str, at: float) -> Account:
+def reset(database: Database, code: str, password: str, at: float) -> Account:
     """Set a new password by a code; it ends all log-ins and tokens. WrongEntryError if the code is not good."""
-    account = session.get(Account, _use(session, code, "password", at).account_id)
-    if account is None or account.removed is not None:
-        raise WrongEntryError("code: its account has been removed")
-    set_password(session, account, password, at)
+    with database.reading() as session:
+        _good(session, code, "password", at)
+    kept = hashed(password)
+    with database.writing() as session:
+        account = session.get_one(Account, _good(session, code, "password", at).account_id)
+        set_password(session, account, kept, at)
     return account
 
 
 def set_password(session: Session, account: Account, password: str, at: float) -> None:
-    """Set another password; log-ins with the old one end, and so do the tokens."""
-    account.password = _hasher().hash(_checked_password(password))
+    """Set another password, `hashed`; log-ins with the old one end, and so do tokens and codes for a new one."""
+    account.password = password
     account.epoch += 1
     for token in tokens(session, account):
         token.revoked = at
+    _void(session, Code.account_id == account.id, at)
+
+
+def _void(session: Session, which: ColumnElement[bool], at: float) -> None:
+    """End codes that are good."""
+    session.execute(update(Code).where(which, Code.used.is_(None)).values(used=at))
 
 
 def remove(session: Session, account: Account, at: float) -> None:
-    """Remove a person: name, password and tokens go; the team's submissions and what it won stay."""
+    """Remove a person: name, password and tokens go; the team's submissions and what it won stay.
+
+    Nobody joins by an invitation to the team that the person may know, or that the person has made.
+    """
+    known = or_(Code.account_id == account.id, Code.made_by == account.id)
+    if account.team_id is not None:
+        known = or_(known, Code.team_id == account.team_id)
+    _void(session, known, at)
     for token in tokens(session, account):
         token.revoked = at
         token.name = "removed"

@@ -26,13 +26,13 @@ class Base(DeclarativeBase):
 
 
 class Team(Base):
-    """A team; `turn` is the number of the last chunk it was served, by which the queue goes round the teams."""
+    """A team; `turn` counts the seconds of workers that it has had, by which the queue goes round the teams."""
 
     __tablename__ = "team"
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(String(60), unique=True)
     created: Mapped[float]
-    turn: Mapped[int] = mapped_column(default=0)
+    turn: Mapped[float] = mapped_column(default=0.0)
     accounts: Mapped[list[Account]] = relationship(back_populates="team")
 
 
@@ -52,7 +52,10 @@ class Account(Base):
 
 
 class Code(Base):
-    """A code of an invitation or of a new password, by its SHA-256; it is good once, until it expires."""
+    """A code of an invitation or of a new password, by its SHA-256; it is good once, until it expires.
+
+    `account_id` is whose password it is for, `made_by` who invites; `used` is also when it was revoked.
+    """
 
     __tablename__ = "code"
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -61,6 +64,7 @@ class Code(Base):
     role: Mapped[str | None] = mapped_column(String(20))
     team_id: Mapped[int | None] = mapped_column(ForeignKey("team.id"))
     account_id: Mapped[int | None] = mapped_column(ForeignKey("account.id"))
+    made_by: Mapped[int | None] = mapped_column(ForeignKey("account.id"))
     expires: Mapped[float]
     used: Mapped[float | None]
 
@@ -163,6 +167,7 @@ class Chunk(Base):
     state: Mapped[str] = mapped_column(String(10))
     token: Mapped[int] = mapped_column(default=0)
     attempts: Mapped[int] = mapped_column(default=0)
+    leased_at: Mapped[float | None]
     leased_until: Mapped[float | None]
     worker: Mapped[str] = mapped_column(String(60), default="")
     note: Mapped[str] = mapped_column(Text, default="")

@@ -72,14 +72,15 @@ def check_podiums(service: Service) -> None:
                 select(Submission.id).where(Submission.phase_id == phase.id, active).limit(1)
             )
             if busy.first() is None and phase.ranked >= phase.version:
-                _run_podium_again(session, phase, service.hiding(phase))
+                _run_podium_again(session, phase, service.hiding(phase), service.clock())
 
 
-def _run_podium_again(session: Session, phase: Phase, hiding: Hiding) -> None:
+def _run_podium_again(session: Session, phase: Phase, hiding: Hiding, at: float) -> None:
     for number in standings.first_entries(session, phase, PODIUM, hiding):
         submission = session.get_one(Submission, number)
         its_trials = submissions.trials(session, submission, hiding)
         left = [trial.number for trial in its_trials if trial.again is None]
+        queue.arrive(session, submission.team_id, at)
         queue.add(session, submission, "again", submissions.in_chunks(left))
     phase.podium_checked = True
 

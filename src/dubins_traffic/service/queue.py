@@ -1,5 +1,8 @@
 """The queue: chunks of trials on lease to workers, team after team. It lies in the tables of what it is about.
 
+Teams are charged the seconds for which workers work for them, and who has had the fewest is next: neither many chunks
+nor slow ones gain a team more than its share. Who was idle begins with as much as those who are not, and saves nothing.
+
 Every function works in a writer's session of its caller, so what it does commits together with what follows from it.
 """
 
@@ -46,23 +49,57 @@ def add(session: Session, submission: Submission, kind: str, chunks: Sequence[Se
 def take(session: Session, worker: str, at: float, seconds: float) -> Chunk | None:
     """Lease the chunk that is next to a worker, for so many seconds; None if nothing waits.
 
-    Next is the team that was served longest ago; of its chunks checks come first, then the oldest.
+    Next is the team for which workers have worked the least; of its chunks checks come first, then what is run again,
+    so that a submission is finished before the next is begun, then the oldest.
     """
-    order = (Team.turn, Chunk.team_id, Chunk.kind != "check", Chunk.id)
-    due = or_(Chunk.leased_until.is_(None), Chunk.leased_until <= at)
-    waiting = select(Chunk).join(Team, Team.id == Chunk.team_id).where(Chunk.state == "waiting", due)
-    chunk = session.scalars(waiting.order_by(*order).limit(1)).first()
-    if chunk is None:
+    due = (Chunk.state == "waiting", or_(Chunk.leased_until.is_(None), Chunk.leased_until <= at))
+    teams = session.scalars(select(Chunk.team_id).where(*due).distinct()).all()
+    if not teams:
         return None
-    latest = session.scalar(select(func.max(Team.turn))) or 0
-    session.execute(update(Team).where(Team.id == chunk.team_id).values(turn=latest + 1))
+    charged = _charged(session, at)
+    team = min(teams, key=lambda number: charged[number])
+    order = (Chunk.kind != "check", Chunk.kind != "again", Chunk.id)
+    query = select(Chunk).where(Chunk.team_id == team, *due).order_by(*order).limit(1)
+    chunk = session.scalars(query).one()
     chunk.state = "leased"
+    chunk.leased_at = at
     chunk.token += 1
     chunk.attempts += 1
     chunk.worker = worker
     chunk.leased_until = at + seconds
     session.flush()
     return chunk
+
+
+def arrive(session: Session, team_id: int, at: float) -> None:
+    """Let a team that had nothing in the queue begin with as much as who has had the least of those who have."""
+    charged = _charged(session, at)
+    if team_id not in charged:
+        most = session.scalar(select(func.max(Team.turn))) or 0.0
+        least = min((seconds for seconds, _, _ in charged.values()), default=most)
+        team = session.get_one(Team, team_id)
+        team.turn = max(team.turn, least)
+
+
+def _charged(session: Session, at: float) -> Mapping[int, tuple[float, int, int]]:
+    """Return what orders the teams that have work in the queue: seconds of workers so far, leases now, number."""
+    in_queue = select(Chunk.team_id).where(Chunk.state.in_(["waiting", "leased"]))
+    teams = session.execute(select(Team.id, Team.turn).where(Team.id.in_(in_queue))).all()
+    leases: dict[int, list[float]] = {}
+    leased = select(Chunk.team_id, Chunk.leased_at).where(Chunk.state == "leased")
+    for team_id, since in session.execute(leased).all():
+        leases.setdefault(team_id, []).append(max(0.0, at - (at if since is None else since)))
+    return {
+        number: (turn + sum(leases.get(number, ())), len(leases.get(number, ())), number)
+        for number, turn in teams
+    }
+
+
+def _charge(session: Session, chunk: Chunk, at: float) -> None:
+    """Charge a team with a lease that ends, whatever came of it."""
+    if chunk.state == "leased" and chunk.leased_at is not None:
+        session.get_one(Team, chunk.team_id).turn += max(0.0, at - chunk.leased_at)
+    chunk.leased_at = None
 
 
 def held(session: Session, chunk_id: int, token: int) -> Chunk:
@@ -76,8 +113,9 @@ def held(session: Session, chunk_id: int, token: int) -> Chunk:
     return chunk
 
 
-def finish(session: Session, chunk: Chunk) -> None:
+def finish(session: Session, chunk: Chunk, at: float) -> None:
     """End a lease with its work done."""
+    _charge(session, chunk, at)
     chunk.state, chunk.leased_until, chunk.note = "done", None, ""
     session.flush()
 
@@ -95,6 +133,7 @@ def release(session: Session, chunk: Chunk, note: str, at: float, *, worker_left
     bool
         False if it has been tried too often, and is given up.
     """
+    _charge(session, chunk, at)
     chunk.attempts -= int(worker_left)
     chunk.leased_until, chunk.note = (None if worker_left else at + FIRST_PAUSE_S * 2.0**chunk.attempts), note
     chunk.state = "waiting" if chunk.attempts < ATTEMPTS else "failed"
@@ -113,11 +152,14 @@ def renew(session: Session, until: float) -> None:
     session.execute(update(Chunk).where(*held_now).values(leased_until=until))
 
 
-def drop(session: Session, submission: Submission) -> None:
+def drop(session: Session, submission: Submission, at: float) -> None:
     """Take all work on a submission out of the queue; who holds a lease of it finds it ended."""
-    open_states = Chunk.state.in_(["waiting", "leased"])
+    of_it = Chunk.submission_id == submission.id
+    for chunk in session.scalars(select(Chunk).where(of_it, Chunk.state == "leased")):
+        _charge(session, chunk, at)
+    session.flush()
     session.execute(
-        update(Chunk).where(Chunk.submission_id == submission.id, open_states).values(state="dropped")
+        update(Chunk).where(of_it, Chunk.state.in_(["waiting", "leased"])).values(state="dropped")
     )
 
 
@@ -131,19 +173,21 @@ def unfinished(session: Session, submission: Submission) -> int:
     return session.scalar(query) or 0
 
 
-def places(session: Session) -> Mapping[int, int]:
-    """Return how many chunks are served until the first of each submission that waits, this included."""
+def places(session: Session, at: float) -> Mapping[int, int]:
+    """Return how many chunks are served until the first of each submission that waits, this included.
+
+    It is told as if all chunks took the same time.
+    """
     rows = session.execute(
-        select(Chunk.submission_id, Chunk.team_id, Team.turn)
-        .join(Team, Team.id == Chunk.team_id)
+        select(Chunk.submission_id, Chunk.team_id)
         .where(Chunk.state == "waiting")
-        .order_by(Chunk.kind != "check", Chunk.id)
+        .order_by(Chunk.kind != "check", Chunk.kind != "again", Chunk.id)
     ).all()
     many = Counter(row.team_id for row in rows)
-    turns = {row.team_id: (row.turn, row.team_id) for row in rows}
+    turns = _charged(session, at)
     before: Counter[int] = Counter()
     places_ahead: dict[int, int] = {}
-    for submission_id, team_id, _ in rows:
+    for submission_id, team_id in rows:
         ahead = before[team_id]
         before[team_id] += 1
         if submission_id not in places_ahead:

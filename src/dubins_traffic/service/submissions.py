@@ -90,6 +90,7 @@ def receive(
     enter(known, "received", at)
     session.add(known)
     session.flush()
+    queue.arrive(session, known.team_id, at)
     queue.add(session, known, "check", [[]])
     return known, True
 
@@ -186,14 +187,14 @@ def sample(numbers: Sequence[int]) -> list[int]:
 
 def reject(session: Session, submission: Submission, reason: str, at: float) -> None:
     """End a submission that can't be run: its team's fault, yet it costs no quota."""
-    queue.drop(session, submission)
+    queue.drop(session, submission, at)
     submission.costs = False
     enter(submission, "rejected", at, shown(reason, 500), THEIRS)
 
 
 def fail(session: Session, submission: Submission, reason: str, at: float) -> None:
     """End a submission by a fault of ours, which costs no quota."""
-    queue.drop(session, submission)
+    queue.drop(session, submission, at)
     submission.costs = False
     enter(submission, "failed", at, shown(reason, 500), OURS)
 
@@ -205,7 +206,7 @@ def cancel(session: Session, submission: Submission, at: float) -> None:
     """
     if submission.state not in ACTIVE:
         raise RefusedError(f"it is {submission.state} already")
-    queue.drop(session, submission)
+    queue.drop(session, submission, at)
     ran = select(Trial.id).where(Trial.submission_id == submission.id).limit(1)
     submission.costs = submission.state in ("running", "scoring") or session.scalar(ran) is not None
     enter(submission, "cancelled", at, "cancelled by the team", THEIRS)
@@ -245,7 +246,7 @@ def record(
             hiding.keep(trial, result_row, result["log"])
             session.add(trial)
     chunk.numbers = numbers
-    queue.finish(session, chunk)
+    queue.finish(session, chunk, at)
     if left:
         queue.add(session, submission, chunk.kind, [left])
     if submission.state in ACTIVE:
@@ -288,6 +289,7 @@ def judge_again(session: Session, submission: Submission, numbers: Sequence[int]
         raise RefusedError("it was rejected: there is nothing to run")
     if submission.content is None:
         raise RefusedError("no worker has checked it: there is nothing to judge again")
-    queue.drop(session, submission)
+    queue.drop(session, submission, at)
     submission.run += 1
+    queue.arrive(session, submission.team_id, at)
     accept(session, submission, numbers, at)

@@ -21,19 +21,20 @@ import structlog
 
 from dubins_traffic.competition.competition import Competition, Phase
 from dubins_traffic.competition.judging import Judged, judge
-from dubins_traffic.competition.submission import Submission, check_submission
+from dubins_traffic.competition.submission import Submission
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.record.reader import Record, from_bytes
 from dubins_traffic.sandbox import available_layers
 from dubins_traffic.sandbox.submission import program_of
 from dubins_traffic.service.client import AwayError, Connection, RefusalError
+from dubins_traffic.service.unpacked import Unpacked
 
 log = structlog.get_logger("dubins_traffic.worker")
 IDLE_S = 0.5
 AWAY_S = 2.0
 UNFIT_S = 5.0
 """How long a worker that has no room leaves the work to others."""
-LONGEST_S = 60.0
+LONGEST_S = 1.0
 """A chunk whose trials have taken so long is reported as far as it is done: others wait for no more than this."""
 NO_ROOM = frozenset(
     (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
@@ -50,7 +51,7 @@ class Worker:
     name : str
         Shown on the page of the queue.
     folder : Path
-        For submissions that are unpacked; kept between chunks.
+        For submissions that are unpacked; kept between chunks, until they are old or too many.
     trust : bool
         Whether submissions may run with fewer limits than this machine should enforce.
     """
@@ -59,7 +60,7 @@ class Worker:
         self._service = connection
         self._name = name
         folder.mkdir(parents=True, exist_ok=True)
-        self._folder = folder
+        self._unpacked = Unpacked(folder / "submissions")
         self._trust = trust
         self._stopping = threading.Event()
 
@@ -147,18 +148,19 @@ class Worker:
         """Return the report of a chunk, None if the worker is to stop or has lost the lease before its end."""
         where = f"/worker/submissions/{lease['digest']}"
         data = self._service.patiently(lambda: self._service.fetch(where), self._over(lost))
-        try:
-            submission = check_submission(data, self._folder / "submissions")
-            program_of(str(submission.path))
-        except InputError as error:
-            if lacks_room(error) or lease["kind"] != "check":
-                raise
-            return {"rejected": str(error)}
-        if lease["kind"] == "check":
-            return {"content": submission.digest}
-        phase = Competition.from_document(lease["competition"]).phase(lease["phase"])
-        seeds = {int(number): int(seed) for number, seed in lease["seeds"].items()}
-        return self._judged(phase, seeds, submission, lease, lost)
+        with contextlib.ExitStack() as held:
+            try:
+                submission = held.enter_context(self._unpacked.held(data))
+                program_of(str(submission.path))
+            except InputError as error:
+                if lacks_room(error) or lease["kind"] != "check":
+                    raise
+                return {"rejected": str(error)}
+            if lease["kind"] == "check":
+                return {"content": submission.digest}
+            phase = Competition.from_document(lease["competition"]).phase(lease["phase"])
+            seeds = {int(number): int(seed) for number, seed in lease["seeds"].items()}
+            return self._judged(phase, seeds, submission, lease, lost)
 
     def _judged(
         self,

@@ -399,6 +399,22 @@ with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
     Attack("looks up a name", (SECCOMP, NETWORK), "got = socket.getaddrinfo('example.org', 80)", alone=False),
     Attack("lists shared memory of the host", (IPC,), "got = str(bait['shared']) in [word for line in text('/proc/sysvipc/shm', 1 << 20).splitlines() for word in line.split()]"),
     Attack("reads the worker's environment in its own", (ENVIRONMENT,), "got = bait['secret'] in str(os.environ)"),
+    Attack("reads the worker's environment in that of the first process", (ENVIRONMENT,), "got = bait['secret'] in text('/proc/1/environ', 1 << 16)"),
+    Attack("reads the name of the host", (FILES,), "got = socket.gethostname() == bait['host']"),
+    Attack("locks a file that others see", (SECCOMP,), """
+import fcntl
+fcntl.flock(os.open('/usr/bin/env', os.O_RDONLY), fcntl.LOCK_EX)
+got = 'locked'
+"""),
+    Attack("locks a part of a file that others see", (SECCOMP,), """
+import fcntl
+fcntl.lockf(os.open('/usr/bin/env', os.O_RDONLY), fcntl.LOCK_SH)
+got = 'locked'
+"""),
+    Attack("asks who has locked a file that others see", (SECCOMP,), """
+import fcntl
+got = fcntl.fcntl(os.open('/usr/bin/env', os.O_RDONLY), fcntl.F_GETLK, struct.pack('hhqqi', fcntl.F_RDLCK, 0, 0, 0, 0))
+"""),
     Attack("finds a descriptor that it has inherited", (ENVIRONMENT,), """
 own = {0, 1, 2, answers}
 for name in os.listdir('/proc/self/fd'):

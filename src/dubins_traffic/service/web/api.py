@@ -95,7 +95,7 @@ class Api(Controller):
             row = receiving.phase_named(session, slug, name)
             if viewer.person.team_id is None:
                 return []
-            places = queue.places(session)
+            places = queue.places(session, service.clock())
             its_submissions = receiving.submissions_of(session, row, viewer.person.team_id)
             return [
                 viewing.submission_document(service, session, one, viewer.person, places)
@@ -153,7 +153,7 @@ def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
     with service.database.reading() as session:
         submission = receiving.submission_numbered(session, number, viewer.account)
         return viewing.submission_document(
-            service, session, submission, viewer.account, queue.places(session)
+            service, session, submission, viewer.account, queue.places(session, service.clock())
         )
 
 

@@ -64,9 +64,19 @@ class Organisers(Controller):
         if role not in accounts.ROLES:
             raise WrongEntryError("role: participant or organiser")
         with service.database.writing() as session:
-            code = accounts.invite(session, role, None, service.clock())
+            code = accounts.invite(session, role, None, service.clock(), by=viewer.person)
             accounts.note(session, viewer.person, "invite", role, "", service.clock())
         return _shown(service, viewer, code=code)
+
+    @post("/invitations/{number:int}/revoke", sync_to_thread=True)
+    def revoke_invitation(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Revoke an invitation, whoever has made it."""
+        with service.database.writing() as session:
+            accounts.revoke_invitation(session, number, service.clock())
+            accounts.note(
+                session, viewer.person, "revoke invitation", f"invitation {number}", "", service.clock()
+            )
+        return Redirect("/desk", status_code=303)
 
     @post("/worker", sync_to_thread=True, status_code=200)
     def worker(self, service: ServiceHere, viewer: ViewerHere, data: Given) -> Template:
@@ -111,7 +121,10 @@ class Organisers(Controller):
         """Show the phases of a competition and all its submissions."""
         with service.database.reading() as session:
             row = receiving.competition_named(session, slug)
-            document, places = viewing.competition_document(service, row), queue.places(session)
+            document, places = (
+                viewing.competition_document(service, row),
+                queue.places(session, service.clock()),
+            )
             for phase, shown in zip(row.phases, document["phases"], strict=True):
                 its_submissions = receiving.submissions_of(session, phase, None)
                 shown["submissions"] = [
@@ -185,6 +198,7 @@ def _shown(service: Service, viewer: Viewer, **secret: Any) -> Template:
         people = session.scalars(select(Account).where(Account.removed.is_(None)).order_by(Account.id)).all()
         teams = {team.id: team.name for team in session.scalars(select(Team))}
         workers = accounts.worker_tokens(session)
+        invitations = accounts.invitations(session, service.clock())
     given = {"code": "", "token": "", "reset": "", **secret}
     return page(
         service,
@@ -195,6 +209,7 @@ def _shown(service: Service, viewer: Viewer, **secret: Any) -> Template:
         people=people,
         teams=teams,
         workers=workers,
+        invitations=invitations,
         url=service.settings.url,
         **given,
     )

@@ -93,7 +93,7 @@ class Pages(Controller):
             row = receiving.phase_named(session, slug, name)
             document, mine, used = viewing.phase_document(service, row, at), [], None
             if account is not None and account.team_id is not None:
-                places = queue.places(session)
+                places = queue.places(session, service.clock())
                 its_submissions = receiving.submissions_of(session, row, account.team_id)
                 mine = [
                     viewing.submission_document(service, session, one, None, places, logs=False)
@@ -260,7 +260,7 @@ class Submitting(Controller):
 def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
     with service.database.reading() as session:
         submission = receiving.submission_numbered(session, number, viewer.account)
-        places = queue.places(session)
+        places = queue.places(session, service.clock())
         document = viewing.submission_document(
             service, session, submission, viewer.account, places, logs=False
         )
@@ -301,8 +301,17 @@ class Teams(Controller):
             raise RefusedError("you are in no team")
         with service.database.writing() as session:
             team = session.get_one(Team, viewer.team.id)
-            code = accounts.invite(session, accounts.PARTICIPANT, team, service.clock())
+            code = accounts.invite(session, accounts.PARTICIPANT, team, service.clock(), by=viewer.person)
         return _shown(service, viewer, code=code)
+
+    @post("/invitations/{number:int}/revoke", sync_to_thread=True)
+    def revoke_invitation(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Revoke an invitation to the own team."""
+        if viewer.team is None:
+            raise RefusedError("you are in no team")
+        with service.database.writing() as session:
+            accounts.revoke_invitation(session, number, service.clock(), viewer.team.id)
+        return Redirect("/team", status_code=303)
 
     @post("/tokens", sync_to_thread=True, status_code=200)
     def token(self, service: ServiceHere, viewer: ViewerHere, data: Given) -> Template:
@@ -327,9 +336,11 @@ class Teams(Controller):
         self, request: Request[Any, Any, Any], service: ServiceHere, viewer: ViewerHere, data: Given
     ) -> Redirect:
         """Set another password."""
+        sure = _sure(service, viewer, data)
+        kept = accounts.hashed(data.get("new", ""))
         with service.database.writing() as session:
-            account = _sure(session, viewer, data)
-            accounts.set_password(session, account, data.get("new", ""), service.clock())
+            account = _still(session, sure)
+            accounts.set_password(session, account, kept, service.clock())
             keep(request, account)
         return Redirect("/team", status_code=303)
 
@@ -338,8 +349,9 @@ class Teams(Controller):
         self, request: Request[Any, Any, Any], service: ServiceHere, viewer: ViewerHere, data: Given
     ) -> Redirect:
         """Remove the own account."""
+        sure = _sure(service, viewer, data)
         with service.database.writing() as session:
-            account = _sure(session, viewer, data)
+            account = _still(session, sure)
             accounts.remove(session, account, service.clock())
             accounts.note(
                 session, None, "remove account", f"account {account.id}", "by its owner", service.clock()
@@ -348,11 +360,20 @@ class Teams(Controller):
         return Redirect("/", status_code=303)
 
 
-def _sure(session: Session, viewer: Viewer, data: Form) -> Account:
+def _sure(service: Service, viewer: Viewer, data: Form) -> Account:
     """Return the own account, if the password given is its."""
-    account = accounts.verified(session, viewer.person.name, data.get("password", ""))
+    with service.database.reading() as session:
+        account = accounts.verified(session, viewer.person.name, data.get("password", ""))
     if account is None:
         raise WrongEntryError("password: not that of this account")
+    return account
+
+
+def _still(session: Session, sure: Account) -> Account:
+    """Return in a writer's session an account whose password was given, if this is still its password."""
+    account = session.get_one(Account, sure.id)
+    if account.epoch != sure.epoch:
+        raise WrongEntryError("password: not that of this account any more")
     return account
 
 
@@ -361,8 +382,11 @@ def _shown(service: Service, viewer: Viewer, code: str = "", token: str = "") ->
         team = session.get(Team, viewer.person.team_id) if viewer.person.team_id else None
         members = [member.name for member in team.accounts] if team else []
         tokens = accounts.tokens(session, viewer.person)
-    given = {"team": team, "members": members, "tokens": tokens, "code": code, "token": token}
-    return page(service, viewer, "team", "Team and account", url=service.settings.url, **given)
+        invitations = () if team is None else accounts.invitations(session, service.clock(), team.id)
+    given = {"team": team, "members": members, "tokens": tokens, "invitations": invitations}
+    return page(
+        service, viewer, "team", "Team and account", url=service.settings.url, code=code, token=token, **given
+    )
 
 
 Asked = Request[Any, Any, Any]
@@ -407,15 +431,14 @@ class Login(Controller):
     ) -> Template | Redirect:
         """Make an account by an invitation, and log in."""
         try:
-            with service.database.writing() as session:
-                account = accounts.register(
-                    session,
-                    data.get("code", ""),
-                    data.get("name", ""),
-                    data.get("password", ""),
-                    data.get("team", ""),
-                    service.clock(),
-                )
+            account = accounts.join(
+                service.database,
+                data.get("code", ""),
+                data.get("name", ""),
+                data.get("password", ""),
+                data.get("team", ""),
+                service.clock(),
+            )
         except WrongEntryError as error:
             return page(service, viewer, "join", "Join", wrong=str(error), given={**data, "password": ""})
         return _enter(request, account)
@@ -431,10 +454,9 @@ class Login(Controller):
     ) -> Template | Redirect:
         """Set a new password by a code, and log in."""
         try:
-            with service.database.writing() as session:
-                account = accounts.reset(
-                    session, data.get("code", ""), data.get("password", ""), service.clock()
-                )
+            account = accounts.reset(
+                service.database, data.get("code", ""), data.get("password", ""), service.clock()
+            )
         except WrongEntryError as error:
             return page(service, viewer, "reset", "New password", wrong=str(error), code=data.get("code", ""))
         return _enter(request, account)

@@ -212,10 +212,10 @@ def _done(service: Service, session: Session, number: int, report: Report) -> No
         results = [msgspec.to_builtins(trial) for trial in report.trials or ()]
         submissions.record(session, chunk, results, at, service.hiding(submission.phase))
     elif report.rejected is not None:
-        queue.finish(session, chunk)
+        queue.finish(session, chunk, at)
         submissions.reject(session, submission, report.rejected, at)
     else:
-        queue.finish(session, chunk)
+        queue.finish(session, chunk, at)
         submission.content = report.content
         submissions.accept(session, submission, service.phase(submission.phase).numbers, at)
     _seen(session, chunk.worker, at, "")

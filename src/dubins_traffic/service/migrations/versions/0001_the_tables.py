@@ -23,6 +23,10 @@ def upgrade() -> None:
                 f"CREATE TRIGGER act_no_{what.lower()} BEFORE {what} ON act "
                 f"BEGIN SELECT RAISE(ABORT, '{KEPT}'); END"
             )
+        op.execute(  # INSERT OR REPLACE deletes a row, and no trigger of DELETE is asked
+            "CREATE TRIGGER act_no_replace BEFORE INSERT ON act WHEN EXISTS (SELECT 1 FROM act WHERE id = NEW.id) "
+            f"BEGIN SELECT RAISE(ABORT, '{KEPT}'); END"
+        )
     else:
         op.execute(
             "CREATE FUNCTION act_is_kept() RETURNS trigger LANGUAGE plpgsql AS "
