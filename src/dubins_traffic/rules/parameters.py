@@ -193,9 +193,11 @@ class RuleParameters:
         return _checked(tuple(rules), values, types) if _NUMBERS.issuperset(types) else _made(rules)
 
     def width_needed(self, width: float, travel: float) -> float:
-        """Return how much of a right lane has to be free for a car (docs/rules.md#room-aside), metres.
+        """Return how much of a right lane has to be free for a car, metres.
 
         The car is `width` m wide, and any point of another gets at most `travel` m in a tick.
+
+        Norm: docs/rules.md#room-aside.
         """
         return width + max(self.blocked_gap, travel + SPARE)
 

@@ -94,9 +94,8 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
         if dx * dx + dy * dy > far * far:
             continue
         _, _, left, px, py = on_way(way, state.x[b, j], state.y[b, j])
-        if (
-            part == PART.BEFORE
-        ):  # a way that turns round would find who is beside the lane beside the lane back
+        # A way that turns round would find who is beside the lane beside the lane back.
+        if part == PART.BEFORE:
             _, _, left, px, py = on_lane(way, state.x[b, j], state.y[b, j])
         half = half_across(b, j, px, py, state, vehicle)
         if vehicle.middle < left < 4.0 * vehicle.middle:

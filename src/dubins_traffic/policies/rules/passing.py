@@ -207,12 +207,8 @@ def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic
     excuse it (docs/rules.md#lacks-room).
     """
     state, labels, roads, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.roads,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     net = drivers.net[b]
     v = lane_end(roads, net, drivers.car[b, n].lane)
     row = int(roads.vert_off[net]) + v

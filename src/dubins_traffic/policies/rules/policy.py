@@ -76,12 +76,8 @@ def decide_trial(
     negative. `apart` (N,) less `loss` (m) is a lower bound on the distance from each car to the nearest other.
     """
     state, labels, obstacles, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.obstacles,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.obstacles, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     scratch.listed[0] = LISTED.NOBODY
     enough = loss + alone(drivers.vehicle[b])
     others = COMPANY.UNSURE if state.count[b] <= FEW else COMPANY.CROWDED
@@ -167,7 +163,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     near = 0
     if not (free and not chooses and drivers.way[b, n].crossing != 0):
         near = gather(b, n, car.lane, x, y, way, traffic)
-    gap, who, close = look_ahead(b, n, part, key, left, x, y, way, near, traffic, vehicle, car)
+    gap, who, close = look_ahead(b, n, part, key, left, x, y, way, near, traffic)
     rides = (
         car.violations & VIOLATION.TAILGATING != 0
         and outside
@@ -218,16 +214,9 @@ def just_drives(car: Driver) -> bool:
 
 @jit_inline
 def follow(
-    b: int,
-    n: int,
-    speed: float,
-    gap: float,
-    who: int,
-    rides: bool,
-    part: int,
-    way: ReferencePath,
+    b: int, n: int, speed: float, gap: float, who: int, rides: bool, part: int, way: ReferencePath,
     traffic: Traffic,
-) -> tuple[float, float]:
+) -> tuple[float, float]:  # fmt: skip
     """Return (speed, gap to keep) of a car that has `who` ahead."""
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
@@ -264,18 +253,9 @@ def dawdle(b: int, n: int, speed: float, to_go: float, near: int, traffic: Traff
 
 @jit_inline
 def pass_what_stands(
-    b: int,
-    n: int,
-    speed: float,
-    gap: float,
-    kept: float,
-    who: int,
-    part: int,
-    outside: bool,
-    way: ReferencePath,
-    near: int,
-    traffic: Traffic,
-) -> tuple[float, float]:
+    b: int, n: int, speed: float, gap: float, kept: float, who: int, part: int, outside: bool,
+    way: ReferencePath, near: int, traffic: Traffic,
+) -> tuple[float, float]:  # fmt: skip
     """Return (speed, offset to the left of the way): of a car that drives on the left, or passes, or waits to."""
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]

@@ -28,12 +28,8 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
     `near` (count) cars are listed.
     """
     state, labels, obstacles, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.obstacles,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.obstacles, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     own = along(way, state.x[b, n], state.y[b, n])

@@ -47,18 +47,9 @@ GOES_NOW = FLAG.STOPPED | FLAG.FIRST | FLAG.CLEAR
 
 @jit_inline
 def yield_at_line(
-    b: int,
-    n: int,
-    tick: int,
-    speed: float,
-    part: int,
-    left: float,
-    x: float,
-    y: float,
-    way: ReferencePath,
-    near: int,
-    traffic: Traffic,
-) -> float:
+    b: int, n: int, tick: int, speed: float, part: int, left: float, x: float, y: float, way: ReferencePath,
+    near: int, traffic: Traffic,
+) -> float:  # fmt: skip
     """Return the speed at which the car does not enter the disc at the end of its lane unless it may."""
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]
@@ -97,12 +88,8 @@ def may_enter_bend(
     who has waited for that for long takes the way on.
     """
     state, labels, roads, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.roads,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     degree = roads.degree[roads.vert_off[drivers.net[b]] + v]
@@ -281,12 +268,8 @@ def is_due(turn: int, bits: Any, vehicle: Vehicle) -> bool:
 def before_ego(b: int, n: int, near: int, traffic: Traffic) -> bool:
     """Tell whether the ego comes behind a nemesis outside the discs, and no other car has to get out of a disc."""
     state, labels, roads, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.roads,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     net = drivers.net[b]
     lane = labels.lane[b, n]
     if lane < 0 or labels.crosses[b, n] >= 0:

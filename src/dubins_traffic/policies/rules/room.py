@@ -55,12 +55,8 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
     will be before this one.
     """
     state, labels, roads, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.roads,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
     mouth, pitch = queue_lengths(vehicle)
@@ -131,12 +127,8 @@ def is_slow(b: int, j: Any, heading: float, state: State) -> bool:
 def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
     """Tell whether a car can leave the disc by the lane `out` for all that is there now, wherever that may stop."""
     state, labels, roads, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.roads,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     net = drivers.net[b]
     vehicle = drivers.vehicle[b]
     mouth, pitch = queue_lengths(vehicle)
@@ -160,12 +152,8 @@ def is_free(b: int, n: int, out: int, traffic: Traffic) -> bool:
     Outside the disc that is as the referee has it. Who is in it and nearest to that road counts as in the lane, too.
     """
     state, labels, roads, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.roads,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     net, vehicle = drivers.net[b], drivers.vehicle[b]
     start = lane_start(roads, net, out)
     corner = roads.vertex[int(roads.vert_off[net]) + start]
@@ -214,12 +202,8 @@ def is_pressed(b: int, n: int, traffic: Traffic) -> bool:
     It, or the cars between, are close behind one another already.
     """
     state, labels, roads, drivers, scratch = (
-        traffic.state,
-        traffic.labels,
-        traffic.roads,
-        traffic.drivers,
-        traffic.scratch,
-    )
+        traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
+    )  # fmt: skip
     net, vehicle, lane = drivers.net[b], drivers.vehicle[b], drivers.car[b, n].lane
     v = lane_start(roads, net, lane)
     if labels.crosses[b, n] >= 0:

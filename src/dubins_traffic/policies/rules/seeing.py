@@ -62,17 +62,9 @@ def corridor(left: float, wide: float) -> tuple[float, float]:
 
 @jit_inline
 def meets_nobody(
-    b: int,
-    n: int,
-    part: int,
-    key: float,
-    left: float,
-    x: float,
-    y: float,
-    way: ReferencePath,
-    state: State,
+    b: int, n: int, part: int, key: float, left: float, x: float, y: float, way: ReferencePath, state: State,
     vehicle: Vehicle,
-) -> bool:
+) -> bool:  # fmt: skip
     """Tell whether no car of the trial is close to a car that just drives on, or ahead on its way."""
     far, touch = alone(vehicle), 2.0 * vehicle.reach + vehicle.near
     low, high = corridor(left, 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE)
@@ -127,24 +119,15 @@ def add_segment(segment: int, n: int, count: int, scratch: Scratch) -> int:
 
 @jit_inline
 def look_ahead(
-    b: int,
-    n: int,
-    part: int,
-    key: float,
-    left: float,
-    x: float,
-    y: float,
-    way: ReferencePath,
-    near: int,
+    b: int, n: int, part: int, key: float, left: float, x: float, y: float, way: ReferencePath, near: int,
     traffic: Traffic,
-    vehicle: Vehicle,
-    car: Driver,
-) -> tuple[float, int, bool]:
+) -> tuple[float, int, bool]:  # fmt: skip
     """Return (gap, who, close): the first thing ahead on the way, and whether anything is close.
 
     `who` is a car, or -2 - p for obstacle part p. The gap to a car that `has_to_go_back` is less `FACING_GAP`.
     """
     state, labels, obstacles, scratch = traffic.state, traffic.labels, traffic.obstacles, traffic.scratch
+    vehicle, car = traffic.drivers.vehicle[b], traffic.drivers.car[b, n]
     reach = vehicle.reach
     wide = 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE
     low, high = corridor(left, wide)

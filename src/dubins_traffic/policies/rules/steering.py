@@ -193,16 +193,9 @@ def follows_line(b: int, n: int, left: float, traffic: Traffic) -> bool:
 
 @jit_inline
 def follow_line(
-    b: int,
-    n: int,
-    speed: float,
-    left: float,
-    px: float,
-    py: float,
-    bend: float,
-    traffic: Traffic,
+    b: int, n: int, speed: float, left: float, px: float, py: float, bend: float, traffic: Traffic,
     commands: Floats,
-) -> None:
+) -> None:  # fmt: skip
     """Write the command of a car `left` (m) of its line, whose direction is (px, py) and curvature `bend` (1/m)."""
     state, vehicle = traffic.state, traffic.drivers.vehicle[b]
     speed = slowed(speed, bend, vehicle.yaw_most)
