@@ -293,10 +293,10 @@ def test_environments_of_gymnasium_are_drawn_alike_one_by_one_and_many_at_once()
 
 def test_the_page_on_agents_runs(tmp_path: Path) -> None:
     blocks = runnable((ROOT / "docs" / "learning-agents.md").read_text(encoding="utf-8"))
-    assert len(blocks) == 3
+    assert len(blocks) == 2
     for language, text in blocks:
         run_block(language, text, tmp_path)
-    assert {"episode.mcap", "town.png"} <= {path.name for path in tmp_path.iterdir()}
+    assert "episode.mcap" in {path.name for path in tmp_path.iterdir()}
 
 
 def test_the_example_of_adversaries_drives_alike_again_and_breaks_nothing_of_e1_and_e2() -> None:
