@@ -126,6 +126,12 @@ class Car:
         """4w, metres."""
         return 4.0 * self.w
 
+    @property
+    def point_speed(self) -> float:
+        """The speed that no point of the body exceeds, m/s."""
+        turns = self.bounds.yaw_rate * self.body.reach if isinstance(self.body, Rectangle) else 0.0
+        return max(self.bounds.speed, -self.bounds.speed_low) + turns
+
 
 @dataclass(frozen=True, slots=True)
 class DiscObstacle:

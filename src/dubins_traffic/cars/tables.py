@@ -35,6 +35,7 @@ class CarTable(Tables):
     yaw_rate: Floats
     turning_radius: Floats
     w: Floats
+    point_speed: Floats
 
 
 @record
@@ -93,12 +94,6 @@ def pack_cars(cars: Sequence[Car]) -> CarTable:
     return CarTable(*np.ascontiguousarray(rows[index].T))
 
 
-def fastest_points(cars: CarTable) -> Floats:
-    """Return the speed (B,) that no point of a car's body exceeds, m/s."""
-    turning = np.where(cars.half_length > 0.0, cars.yaw_rate * cars.reach, 0.0)
-    return np.maximum(cars.speed_high, -cars.speed_low) + turning
-
-
 def pack_obstacles(obstacles: Sequence[Sequence[Obstacle]]) -> ObstacleTable:
     """Return the table of one sequence of obstacles per trial."""
     if not any(obstacles):
@@ -132,6 +127,7 @@ def _car_row(car: Car) -> tuple[float, ...]:
         bounds.yaw_rate,
         bounds.turning_radius,
         car.w,
+        car.point_speed,
     )
 
 

@@ -78,7 +78,7 @@ class LimitsTable(Strict):
     wall: Seconds | None = Field(
         default=None,
         description="wall-clock time beyond five times its processor time, s: for those that sleep; left out: twice "
-        "the duration of the trial, 30 at least and 120 at most",
+        f"the duration of the trial, {WALL_S[0]:g} at least and {WALL_S[1]:g} at most",
     )
     memory: Annotated[int, Field(ge=16, le=1_000_000)] = Field(default=1024, description="memory, MiB")
     processes: Annotated[int, Field(ge=1, le=10_000)] = Field(

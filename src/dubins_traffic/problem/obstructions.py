@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from dubins_traffic.cars.body import Obstacle
-from dubins_traffic.cars.tables import fastest_points, pack_cars, pack_obstacles
+from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.network import RoadNetwork
@@ -131,8 +131,7 @@ class _Beside:
         self._network, self._w = problem.network, car.w
         self._radius = problem.intersection_radius
         self._room = rules.room_beyond(car.body.reach, 2)
-        travel = float(fastest_points(pack_cars([car]))[0]) * problem.period
-        self._needed = rules.width_needed(car.body.width, travel)
+        self._needed = rules.width_needed(car.body.width, car.point_speed * problem.period)
         self._beside = _placed(self._network, obstacle, car.lane_width)
 
     @cached_property

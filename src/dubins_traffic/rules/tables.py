@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 import numpy as np
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import CarTable, fastest_points
+from dubins_traffic.cars.tables import CarTable
 from dubins_traffic.kernels.arrays import BLOCK, WIDE, Floats, Ints
 from dubins_traffic.kernels.records import Grid, Rows, columns, record, table
 from dubins_traffic.kernels.tables import Tables
@@ -297,7 +297,6 @@ def pack_rules(
         The car of each trial.
     """
     rules = table(TrialRules, len(parameters))
-    points = fastest_points(cars)
     for b, (given, radius, rate) in enumerate(zip(parameters, radii, rates, strict=True)):
         own = rules[b]
         rounding = float(cars.rounding[b])
@@ -313,7 +312,7 @@ def pack_rules(
         own.half_width = float(cars.half_width[b])
         own.rounding = rounding
         own.lane_width = 2.0 * float(cars.w[b])
-        own.free_needed = given.width_needed(width, float(points[b]) / rate)
+        own.free_needed = given.width_needed(width, float(cars.point_speed[b]) / rate)
         own.turn_back = given.turn_back
         own.left_set = given.left_set
         own.left_release = given.left_release

@@ -335,9 +335,10 @@ def _groups(layers: Layers) -> cgroups.Trees:
 
 
 def _environment(program: Program, layers: Layers) -> dict[str, str]:
+    path = SYSTEM if layers.boxes else os.environ.get("PATH", os.defpath)
+    base = {"PATH": path} if ENVIRONMENT in layers else dict(os.environ)
     if layers.boxes:
-        return {"PATH": SYSTEM} if ENVIRONMENT in layers else dict(os.environ)
-    base = {"PATH": os.environ.get("PATH", os.defpath)} if ENVIRONMENT in layers else dict(os.environ)
+        return base
     more = {name: outside(program, value) for name, value in program.environment.items()}
     return base | {"HOME": "/tmp", "LANG": "C.UTF-8", **more}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from dubins_traffic.cars.body import Car, Rectangle
+from dubins_traffic.cars.body import Car
 from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.policies.safety import GUARD, NEAR
 from dubins_traffic.rules.parameters import RuleParameters
@@ -42,9 +42,7 @@ def turns_within_road(tightest: float, middle: float) -> bool:
 
 def near_of(car: Car, period: float) -> float:
     """Return the gap between two cars, metres, beyond which no tick of `period` (s) brings them together."""
-    bounds = car.bounds
-    turns = bounds.yaw_rate * car.body.reach if isinstance(car.body, Rectangle) else 0.0
-    return max(NEAR, 2.0 * (max(bounds.speed, -bounds.speed_low) + turns) * period + GUARD)
+    return max(NEAR, 2.0 * car.point_speed * period + GUARD)
 
 
 def sight_of(w: float) -> float:

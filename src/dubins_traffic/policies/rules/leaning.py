@@ -20,9 +20,8 @@ from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import half_across
 
 BESIDE_LINE = 1.5
-"""So near to the disc at the end of its lane, metres, a car leans past an ego that stands beside the line. Farther back
-it goes by in the middle of its lane, where it has room to turn straight again."""
-
+"""So near to the disc at the end of its lane, metres, a car leans only past an ego that stands beside the line. Farther
+back it leans past whoever is beside it, and has room to turn straight again."""
 EARLY = 0.8
 """A car leans from this gap to a body on, metres: beside it a rectangle would have no room to turn."""
 
@@ -48,10 +47,10 @@ def lean(b: int, n: int, offset: float, part: int, way: ReferencePath, near: int
 
 @jit_rare
 def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
-    """Tell whether a car may turn aside where it is: in a bend, on a road, and before a crossing past a standing ego.
+    """Tell whether a car may turn aside where it is: in bends and on roads, and in and near crossings past the ego.
 
-    Near the crossing out of which it comes it may enter that anew. A rectangle that is tilted at a line may find no
-    room to turn, so it does not lean there away from other e-agents, which drive on.
+    Near the crossing out of which it comes a car may enter that anew, and a rectangle that is tilted at a line may find
+    no room to turn. So it leans there past an ego that stands, and not past other e-agents, which drive on.
     """
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     vehicle, net = drivers.vehicle[b], drivers.net[b]
@@ -93,10 +92,11 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
         dx, dy = state.x[b, j] - state.x[b, n], state.y[b, j] - state.y[b, n]
         if dx * dx + dy * dy > far * far:
             continue
-        _, _, left, px, py = on_way(way, state.x[b, j], state.y[b, j])
         # A way that turns round would find who is beside the lane beside the lane back.
         if part == PART.BEFORE:
             _, _, left, px, py = on_lane(way, state.x[b, j], state.y[b, j])
+        else:
+            _, _, left, px, py = on_way(way, state.x[b, j], state.y[b, j])
         half = half_across(b, j, px, py, state, vehicle)
         if vehicle.middle < left < 4.0 * vehicle.middle:
             offset = min(offset, left - half - clear)

@@ -20,7 +20,7 @@ from dubins_traffic.rules.shape import half_across
 
 PASSING_WAIT = 2.0
 """Seconds to wait behind what stands before passing it."""
-BERTH, SPARES = 0.12, 0.02
+BERTH, WARY = 0.12, 0.02
 """Gap beside what is passed, metres; and the least beyond what a car that stands may get in a tick."""
 SLIP = 0.25
 """A car begins to return this far past what it passes, metres, beyond the length of a rectangle."""
@@ -266,7 +266,7 @@ def extent(
     offset = -1.0
     low = INFINITE
     reach = vehicle.reach
-    wary = max(travel_of(vehicle) + GUARD + SPARES - BERTH, 0.0)
+    wider = max(travel_of(vehicle) + GUARD + WARY - BERTH, 0.0)
     before = end - 1.0
     while end > before:
         before = end
@@ -282,8 +282,8 @@ def extent(
                 and left < vehicle.middle
             ):
                 end = max(end, key)
-                half = reach if wary > 0.0 else half_across(b, j, way.tx, way.ty, state, vehicle)
-                offset = max(offset, left + half + wary)
+                half = reach if wider > 0.0 else half_across(b, j, way.tx, way.ty, state, vehicle)
+                offset = max(offset, left + half + wider)
                 low = -INFINITE
             j = scratch.link[j]
         for p in range(obstacles.off[b], obstacles.off[b + 1]):

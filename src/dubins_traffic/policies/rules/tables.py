@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.cars.state import Labels, State
-from dubins_traffic.cars.tables import ObstacleTable, fastest_points, pack_cars
+from dubins_traffic.cars.tables import ObstacleTable, pack_cars
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
@@ -329,7 +329,6 @@ def _vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
     rows["fastest"] = cars.speed_high
     rows["slowest"] = cars.speed_low
     widths = (2.0 * (cars.half_width + cars.rounding)).tolist()
-    points = fastest_points(cars)
     for k, (problem, width) in enumerate(zip(problems, widths, strict=True)):
         own, rules = rows[k], RuleParameters.from_mapping(problem.rules)
         own.disc = problem.intersection_radius
@@ -342,7 +341,7 @@ def _vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
         own.over = rules.left_set
         own.behind = rules.overtaking_behind
         own.fore = rules.overtaking_ahead
-        own.needed = rules.width_needed(width, float(points[k]) * problem.period)
+        own.needed = rules.width_needed(width, problem.car.point_speed * problem.period)
         own.left_time = rules.left_time
         own.stand_time = rules.stand_time
         own.backs_up = rules.turn_back
