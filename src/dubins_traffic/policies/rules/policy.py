@@ -184,21 +184,10 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     if not close and follows_line(b, n, left - offset, traffic):
         follow_line(b, n, speed, left - offset, px, py, bend, traffic, commands)
         return
+    listed, trusted = near if close else 0, who if rides else -1
     speed, yaw_rate = move(
-        b,
-        n,
-        speed,
-        left,
-        offset,
-        px,
-        py,
-        bend,
-        outside,
-        way,
-        near if close else 0,
-        who if rides else -1,
-        traffic,
-    )
+        b, n, speed, left, offset, px, py, bend, outside, way, listed, trusted, traffic
+    )  # fmt: skip
     checked = car.kind == KIND.ROUND and company != COMPANY.UNROLLED
     if speed != 0.0 and checked and strays(b, n, speed, yaw_rate, way, traffic):
         speed = 0.0

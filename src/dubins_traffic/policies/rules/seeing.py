@@ -189,9 +189,9 @@ def wider(b: int, px: float, py: float, state: State, vehicle: Vehicle) -> float
 
 @jit_rare
 def comes_past(way: ReferencePath, x: float, y: float, dx: float, dy: float, wide: float) -> bool:
-    """Tell whether a car at (x, y), astray left of its way, comes back to it straight past a body beside it.
+    """Tell whether a car at `x` (m), `y` (m), astray left of its way, comes back to it straight past a body beside it.
 
-    The body's centre is (`dx`, `dy`) metres from the car's; past means at least `wide` (m) beside, or behind.
+    The body's centre is `dx` (m) and `dy` (m) from the car's; past means at least `wide` (m) beside, or behind.
     """
     _, _, _, px, py = on_way(way, x, y)
     cosine = sqrt(1.0 - ABRUPT * ABRUPT)

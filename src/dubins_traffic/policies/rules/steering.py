@@ -106,16 +106,15 @@ def goes_on(
     b: int, n: int, speed: float, outside: bool, way: ReferencePath, near: int, traffic: Traffic
 ) -> bool:
     """Tell whether an e-agent beside which another car is as close as may be can drive straight on past it."""
-    state, vehicle = traffic.state, traffic.drivers.vehicle[b]
-    pose, command = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]), Command(speed, 0.0)
+    state, vehicle, scratch = traffic.state, traffic.drivers.vehicle[b], traffic.scratch
+    pose, beside = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]), 0
     for k in range(near):
-        j = traffic.scratch.near[k]
-        other = Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])
-        meets = may_meet(pose, command, vehicle, other, travel_of(vehicle))
-        if meets and not slides_on(pose, vehicle, other):
-            return False
-    off = may_hit(b, pose, command, vehicle, traffic.obstacles, vehicle.near, 0.0)
-    return not off and (not outside or stays_right(b, n, speed, 0.0, way, traffic))
+        j = scratch.near[k]
+        if not slides_on(pose, vehicle, Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])):
+            scratch.near[beside] = j
+            beside += 1
+    on = is_safe_from(pose, b, Command(speed, 0.0), beside, -1, traffic, vehicle)
+    return on and (not outside or stays_right(b, n, speed, 0.0, way, traffic))
 
 
 @jit_rare
