@@ -65,20 +65,15 @@ def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
     if disc >= 0 and int(roads.degree[first + disc]) < vehicle.degree:
         return True
     if lane < 0:
-        return disc >= 0 and ego_is_beside_lane(b, drivers.car[b, n].lane, traffic)
+        beside = int(labels.lane[b, EGO]) ^ 1
+        return disc >= 0 and beside in (drivers.car[b, n].lane, drivers.car[b, n].next_lane)
     v = lane_end(roads, net, lane)
     begin, end = int(roads.degree[first + lane_start(roads, net, lane)]), int(roads.degree[first + v])
     near = way_to_go(way, traffic.state.x[b, n], traffic.state.y[b, n]) > -(vehicle.disc + BESIDE_LINE)
     left_disc = begin < vehicle.degree or not is_by_disc_behind(b, n, way, traffic)
     if disc < 0 and left_disc and (end < vehicle.degree or not near):
         return True
-    return (near or not left_disc) and ego_is_beside_lane(b, lane, traffic)
-
-
-@jit_rare
-def ego_is_beside_lane(b: int, lane: int, traffic: Traffic) -> bool:
-    """Tell whether the ego is on the road of a lane, with the other lane state: it may stand there, as in a queue."""
-    return traffic.labels.lane[b, EGO] == lane ^ 1
+    return (near or not left_disc) and labels.lane[b, EGO] == lane ^ 1
 
 
 @jit_rare
