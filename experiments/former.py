@@ -1,4 +1,4 @@
-"""`rules` of edition 3 beside `rules` of edition 2: on the instances and durations of edition 2, clean, and with as many rounds.
+"""`rules` of edition 3 beside that of edition 2, on the instances and durations of that: clean, with as many rounds.
 
     python -m experiments former
 
