@@ -18,5 +18,6 @@ def test_no_module_holds_markup() -> None:
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.html")), ids=lambda path: path.name)
 def test_every_template_is_one(path: object) -> None:
-    environment().filters.setdefault("moment", str)
+    for name in ("moment", "markdown"):
+        environment().filters.setdefault(name, str)
     environment().get_template(str(path).removeprefix(f"{PACKAGE}/"))

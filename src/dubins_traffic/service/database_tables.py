@@ -26,13 +26,17 @@ class Base(DeclarativeBase):
 
 
 class Team(Base):
-    """A team; `turn` counts the seconds of workers that it has had, by which the queue goes round the teams."""
+    """A team; `turn` counts the seconds of workers that it has had, by which the queue goes round the teams.
+
+    `baseline` says that it is a built-in controller, which is shown apart.
+    """
 
     __tablename__ = "team"
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(String(60), unique=True)
     created: Mapped[float]
     turn: Mapped[float] = mapped_column(default=0.0)
+    baseline: Mapped[bool] = mapped_column(Boolean, default=False)
     accounts: Mapped[list[Account]] = relationship(back_populates="team")
 
 
@@ -91,6 +95,17 @@ class Competition(Base):
     document: Mapped[str] = mapped_column(Text)
     created: Mapped[float]
     phases: Mapped[list[Phase]] = relationship(back_populates="competition", order_by="Phase.id")
+
+
+class Announcement(Base):
+    """What organisers tell everybody about a competition, in Markdown."""
+
+    __tablename__ = "announcement"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    competition_id: Mapped[int] = mapped_column(ForeignKey("competition.id"), index=True)
+    at: Mapped[float]
+    title: Mapped[str] = mapped_column(Text)
+    text: Mapped[str] = mapped_column(Text)
 
 
 class Phase(Base):

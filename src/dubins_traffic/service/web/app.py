@@ -39,6 +39,7 @@ from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service, ServiceSettings
 from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
+from dubins_traffic.service.texts import html_of
 from dubins_traffic.service.web import api, organisers, pages, worker_api
 from dubins_traffic.service.web.pages import TEMPLATES, moment
 from dubins_traffic.service.web.requests import PROGRAMS, Bodies, Recognition, Viewer
@@ -178,7 +179,7 @@ def _middleware(settings: ServiceSettings, largest: int) -> list[Any]:
 
 def _templates() -> JinjaTemplateEngine:
     made = environment().overlay(undefined=Undefined)  # forms are shown before and after they are filled in
-    made.filters["moment"] = moment  # pyright: ignore[reportUnknownMemberType]
+    made.filters |= {"moment": moment, "markdown": html_of}  # pyright: ignore[reportUnknownMemberType]
     return JinjaTemplateEngine.from_environment(made)
 
 

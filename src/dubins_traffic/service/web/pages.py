@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
-from typing import Any
+from typing import Annotated, Any
 
 from litestar import Controller, MediaType, Request, Response, get, post
 from litestar.datastructures import UploadFile
 from litestar.exceptions import NotFoundException
-from litestar.params import FromPath, FromQuery, MultipartBody, URLEncodedBody
+from litestar.params import FromPath, FromQuery, MultipartBody, QueryParameter, URLEncodedBody
 from litestar.response import Redirect, Template
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.competition import sealing
-from dubins_traffic.service import accounts, queue, receiving, standings, submissions, viewing
+from dubins_traffic.service import accounts, queue, receiving, submissions, texts, viewing
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.database_tables import (
     Account,
     Competition,
-    Standing,
     Submission,
     Team,
     Token,
@@ -80,8 +78,9 @@ class Pages(Controller):
     def competition(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
         """Show a competition and its phases."""
         with service.database.reading() as session:
-            document = viewing.competition_document(service, receiving.competition_named(session, slug))
-        return page(service, viewer, "competition", document["title"], competition=document)
+            row = receiving.competition_named(session, slug)
+            document, news = viewing.competition_document(service, row), viewing.news(session, row)
+        return page(service, viewer, "competition", document["title"], competition=document, news=news)
 
     @get("/c/{slug:str}/{name:str}", sync_to_thread=True)
     def phase(
@@ -108,24 +107,59 @@ class Pages(Controller):
 
     @get("/c/{slug:str}/{name:str}/table", sync_to_thread=True)
     def table(
-        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+        self,
+        service: ServiceHere,
+        viewer: ViewerHere,
+        slug: FromPath[str],
+        name: FromPath[str],
+        page_number: Annotated[int, QueryParameter(name="page", ge=0, le=1_000_000)] = 0,
     ) -> Template:
-        """Show the leaderboard of a phase and its history."""
-        at = service.clock()
+        """Show the leaderboard of a phase, and a page of its history."""
+        account, at = viewer.account, service.clock()
         with service.database.reading() as session:
             row = receiving.phase_named(session, slug, name)
-            phase, document = service.phase(row), viewing.phase_document(service, row, at)
-            sees = viewing.sees_table(row, viewer.account, at)
-            every: Sequence[Standing] = standings.history(session, row, service.hiding(row)) if sees else ()
-            whole = row.is_closed(at) or viewer.organiser
-            tables = [
-                (one.at, list(one.places) if whole else standings.shown_table(phase, one)) for one in every
-            ]
+            document, sees = viewing.phase_document(service, row, at), viewing.sees_table(row, account, at)
+            made, rows = viewing.latest_places(service, session, row, account)
+            past, older = viewing.past_places(service, session, row, account, page_number)
             title = row.competition.title
-        given = {"phase": document, "slug": slug, "competition": title, "sees": sees}
-        latest = tables[-1] if tables else None
-        past = tables[-21:-1][::-1]
-        return page(service, viewer, "table", f"{title}: {name}: table", latest=latest, past=past, **given)
+        given = {"phase": document, "slug": slug, "competition": title, "sees": sees, "number": page_number}
+        given |= {"made": made, "rows": rows, "past": past, "older": older}
+        return page(service, viewer, "table", f"{title}: {name}: table", **given)
+
+    @get("/c/{slug:str}/{name:str}/table.csv", sync_to_thread=True)
+    def csv_table(
+        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+    ) -> Response[str]:
+        """Return the table of a phase, as far as it may be seen, for spreadsheets."""
+        with service.database.reading() as session:
+            row = receiving.phase_named(session, slug, name)
+            _, rows = viewing.latest_places(service, session, row, viewer.account)
+        return Response(texts.csv_of(rows), media_type="text/csv; charset=utf-8")
+
+    @get("/c/{slug:str}/news.atom", sync_to_thread=True)
+    def feed(
+        self, request: Request[Any, Any, Any], service: ServiceHere, slug: FromPath[str]
+    ) -> Response[bytes]:
+        """Return the announcements of a competition as an Atom feed."""
+        with service.database.reading() as session:
+            row = receiving.competition_named(session, slug)
+            news = viewing.news(session, row)
+        url = f"{(service.settings.url or str(request.base_url)).rstrip('/')}/c/{slug}"
+        return Response(texts.feed(url, row.title, row.created, news), media_type="application/atom+xml")
+
+    @get("/pages/{slug:str}/{name:str}", sync_to_thread=True)
+    def text(
+        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+    ) -> Template:
+        """Show a further text of a competition."""
+        with service.database.reading() as session:
+            row = receiving.competition_named(session, slug)
+            text = service.competition(row).model.pages.get(name)
+        if text is None:
+            raise NotFoundException("no such page")
+        return page(
+            service, viewer, "text", f"{row.title}: {name}", slug=slug, competition=row.title, text=text
+        )
 
     @get("/c/{slug:str}/{name:str}/commitment.json", sync_to_thread=True)
     def commitment(self, service: ServiceHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
