@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import re
+import zipfile
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree
 
 import pytest
 
-from tests.services import STANDING, Person, Service, competition_text, serving, wait_until
+from tests.services import CRASHING, STANDING, Person, Service, competition_text, serving, wait_until
 
 ATOM = "{http://www.w3.org/2005/Atom}"
 DESK, EDIT = "/desk/c/short", "/desk/edit/short"
@@ -221,3 +223,38 @@ def test_every_act_that_others_notice_asks_once(organiser: Person) -> None:
     assert not re.search(r'method="post" action="[^"]+/(open|close|reveal|reopen|disqualify|remove)"', desk)
     assert "its team reads why" in organiser.get("/desk/s/1/disqualify?why=x").text
     assert "counts again" in organiser.get("/desk/s/1/disqualify").text
+
+
+def test_a_finished_competition_is_a_site_that_needs_no_server(
+    service: Service, organiser: Person, tmp_path: Path
+) -> None:
+    bees = service.person().join(organiser.invite(), "Bea", "Bees")
+    number = bees.submit(
+        "short/validation", CRASHING.replace("def start", "said = 'swordfish'\n\n    def start")
+    )
+    bees.ended(number)
+    place = f"{DESK}/archive.zip"
+    refused = organiser.get(place)
+    assert refused.status_code == 409
+    assert "not over: validation" in refused.text
+    act = f"{DESK}/validation/close"
+    assert organiser.post(act, form=act).status_code == 303
+    path = "/competitions/short/phases/validation/table"
+    wait_until(lambda: service.person().api("GET", path).json())
+    with zipfile.ZipFile(io.BytesIO(organiser.get(place).content)) as packed:
+        packed.extractall(tmp_path)
+    site = tmp_path / "short"
+    pages = {page.name: page.read_text() for page in site.iterdir()}
+    assert {"index.html", "test.html", "test.csv", "test.seeds.txt", "validation.html"} <= pages.keys()
+    for name, text in pages.items():
+        for link in re.findall(r'(?:href|src)="([^"#:]+)"', text.partition("<script")[0]):
+            assert link in pages, (name, link)
+        assert "swordfish" not in text
+        assert "no idea what to do" not in text
+        assert "here I stand" not in text
+    replays = [name for name in pages if name.startswith(("best-", "worst-"))]
+    assert len(replays) >= 4
+    assert "Ants" in pages["test.html"]
+    assert '<tr class="baseline">' in pages["test.html"]
+    assert all(f'href="{name}"' in pages["test.html"] + pages["validation.html"] for name in replays)
+    assert not {"sealed", "submissions"} & {part for file in tmp_path.rglob("*") for part in file.parts}

@@ -69,6 +69,7 @@ ROUTES: dict[tuple[str, str], tuple[str, set[str]]] = {
     ("POST", "/desk/news/{slug:str}"): ("/desk/news/short", {ORGANISER}),
     ("POST", "/desk/retract/{number:int}"): ("/desk/retract/999", {ORGANISER}),
     ("GET", "/desk/c/{slug:str}"): ("/desk/c/short", {ORGANISER}),
+    ("GET", "/desk/c/{slug:str}/archive.zip"): ("/desk/c/short/archive.zip", {ORGANISER}),
     ("GET", "/desk/c/{slug:str}/export.zip"): ("/desk/c/short/export.zip", {ORGANISER}),
     ("GET", "/desk/c/{slug:str}/{name:str}/{act:str}"): ("/desk/c/short/practice/close", {ORGANISER}),
     ("GET", "/desk/s/{number:int}/{act:str}"): ("/desk/s/1/disqualify", {ORGANISER}),

@@ -8,15 +8,18 @@ from __future__ import annotations
 import csv
 import io
 from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
 from functools import cache
 from typing import Any, Final
 from xml.etree import ElementTree
 
+from jinja2 import Environment, Undefined
 from markupsafe import Markup
 
 from dubins_traffic.campaign.columns import SECOND
 from dubins_traffic.service.database_tables import Announcement
 from dubins_traffic.service.viewing import iso
+from dubins_traffic.viewer.pages import environment
 
 ATOM: Final = "http://www.w3.org/2005/Atom"
 COLUMNS: Final = (
@@ -58,6 +61,19 @@ def html_of(text: str) -> Markup:
         if token.type.startswith("heading_"):
             token.tag = f"h{min(6, int(token.tag[1:]) + 1)}"
     return Markup(parser.renderer.render(tokens, parser.options, {}))
+
+
+def moment(at: float | None) -> str:
+    """Return a time as people read it, in UTC."""
+    return "" if at is None else datetime.fromtimestamp(at, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+
+
+@cache
+def templates() -> Environment:
+    """Return the environment of the pages of the service."""
+    made = environment().overlay(undefined=Undefined)  # forms are shown before and after they are filled in
+    made.filters |= {"moment": moment, "markdown": html_of}  # pyright: ignore[reportUnknownMemberType]
+    return made
 
 
 def feed(url: str, title: str, created: float, news: Sequence[Announcement]) -> bytes:

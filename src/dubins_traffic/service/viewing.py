@@ -9,6 +9,7 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from dubins_traffic.competition.ranking import value
 from dubins_traffic.competition.visibility import SubmissionState, visible
 from dubins_traffic.service import standings, submissions
 from dubins_traffic.service.database_tables import (
@@ -194,6 +195,14 @@ def trial_of(service: Service, session: Session, submission: Submission, number:
     )
     trial = session.scalars(query).first()
     return None if trial is None else service.hiding(submission.phase).shown(trial, logs=True)
+
+
+def extremes(service: Service, session: Session, submission: Submission) -> dict[str, Trial]:
+    """Return the trials of a submission with a replay that count the most and the least, as ``best`` and ``worst``."""
+    metric = service.phase(submission.phase).ranking.metric
+    its_trials = submissions.trials(session, submission, service.hiding(submission.phase))
+    ranked = sorted((one for one in its_trials if one.replay), key=lambda trial: value(trial.row, metric))
+    return {"best": ranked[-1], "worst": ranked[0]} if ranked else {}
 
 
 def status_document(service: Service, session: Session) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from litestar.response import Redirect, Template
 from sqlalchemy import select
 
 from dubins_traffic.controllers import registry
-from dubins_traffic.service import accounts, editing, organising, queue, receiving, viewing
+from dubins_traffic.service import accounts, archive, editing, organising, queue, receiving, viewing
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.database_tables import Account, Act, Competition, Submission, Team
 from dubins_traffic.service.receiving import UnknownError
@@ -275,6 +275,14 @@ class Organisers(Controller):
             row = receiving.competition_named(session, slug)
             data = organising.export(service, session, row)
         headers = {"content-disposition": f'attachment; filename="{slug}.zip"'}
+        return Response(data, media_type="application/zip", headers=headers)
+
+    @get("/c/{slug:str}/archive.zip", sync_to_thread=True)
+    def archive(self, service: ServiceHere, slug: FromPath[str]) -> Response[bytes]:
+        """Return a finished competition as a static site."""
+        with service.database.reading() as session:
+            data = archive.archive(service, session, receiving.competition_named(session, slug))
+        headers = {"content-disposition": f'attachment; filename="{slug}-site.zip"'}
         return Response(data, media_type="application/zip", headers=headers)
 
     @get("/s/{number:int}/{act:str}", sync_to_thread=True)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import secrets
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from typing import Annotated, Any
 
 from litestar import Controller, MediaType, Request, Response, get, post
@@ -47,11 +46,6 @@ def page(service: Service, viewer: Viewer, template: str, title: str, /, **given
         **given,
     }
     return Template(f"{TEMPLATES}/{template}.html", context=context)
-
-
-def moment(at: float | None) -> str:
-    """Return a time as people read it, in UTC."""
-    return "" if at is None else datetime.fromtimestamp(at, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
 REPLAY_POLICY = (
