@@ -169,7 +169,8 @@ class Submission(Base):
 class Chunk(Base):
     """A unit of work: the check of a submission, some of its trials, or some of them again.
 
-    `token` is the fencing token: it grows with every lease, and only the latest may report.
+    `token` is the fencing token: it grows with every lease, and only the latest may report. `took` says how many
+    seconds the lease lasted under which it was done.
     """
 
     __tablename__ = "chunk"
@@ -184,6 +185,7 @@ class Chunk(Base):
     attempts: Mapped[int] = mapped_column(default=0)
     leased_at: Mapped[float | None]
     leased_until: Mapped[float | None]
+    took: Mapped[float | None]
     worker: Mapped[str] = mapped_column(String(60), default="")
     note: Mapped[str] = mapped_column(Text, default="")
     submission: Mapped[Submission] = relationship()

@@ -68,11 +68,19 @@ def moment(at: float | None) -> str:
     return "" if at is None else datetime.fromtimestamp(at, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
+def span(seconds: float) -> str:
+    """Return a time roughly, as people say it."""
+    for unit, size in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.0f} {unit}"
+    return "a minute"
+
+
 @cache
 def templates() -> Environment:
     """Return the environment of the pages of the service."""
     made = environment().overlay(undefined=Undefined)  # forms are shown before and after they are filled in
-    made.filters |= {"moment": moment, "markdown": html_of}  # pyright: ignore[reportUnknownMemberType]
+    made.filters |= {"moment": moment, "markdown": html_of, "span": span}  # pyright: ignore[reportUnknownMemberType]
     return made
 
 

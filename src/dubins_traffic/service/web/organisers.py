@@ -20,7 +20,7 @@ from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import requests
-from dubins_traffic.service.web.pages import Form, page
+from dubins_traffic.service.web.pages import Form, asked, page
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
 
 Given = URLEncodedBody[Form]
@@ -327,22 +327,6 @@ class Organisers(Controller):
             acts = session.scalars(select(Act).order_by(Act.id.desc()).limit(500)).all()
             names = {account.id: account.name for account in session.scalars(select(Account))}
         return page(service, viewer, "log", "Log of acts", acts=acts, names=names)
-
-
-def asked(
-    service: Service,
-    viewer: Viewer,
-    where: str,
-    title: str,
-    follows: str,
-    *,
-    back: str,
-    why: str = "",
-    until: str = "",
-) -> Template:
-    """Return the page that asks once before an act: what follows from it, and a form that does it."""
-    given = {"where": where, "follows": follows, "back": back, "why": why, "until": until}
-    return page(service, viewer, "confirm", title, **given)
 
 
 def _given(files: list[UploadFile]) -> dict[str, bytes]:
