@@ -13,13 +13,12 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.browser import browsing, dark, faults
+from tests.browser import WAIT_S, browsing, dark, faults, fill, login
 from tests.services import CIRCLING, CRASHING, PASSWORD, STANDING, Service, competition_text, serving
 
 pytestmark = pytest.mark.tools("browser")
 
 NASTY = "<img src=x onerror=window.broken=1>"
-WAIT_S = 600
 PHONE, DESKTOP = (390, 844), (1280, 900)
 
 
@@ -36,24 +35,6 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
     with browsing(tmp_path_factory.mktemp("profile"), height=900) as driver:
         yield driver
-
-
-def fill(browser: webdriver.Chrome, **fields: str) -> None:
-    """Fill in fields by their ids, and send the form by the Enter key."""
-    last = None
-    for name, value in fields.items():
-        last = browser.find_element(By.ID, name)
-        last.clear()
-        last.send_keys(value)
-    assert last is not None
-    last.send_keys(Keys.ENTER)
-
-
-def login(browser: webdriver.Chrome, service: Service, name: str) -> None:
-    browser.delete_all_cookies()
-    browser.get(f"{service.url}/login")
-    fill(browser, name=name, password=PASSWORD)
-    WebDriverWait(browser, WAIT_S).until(lambda _: browser.current_url == f"{service.url}/")
 
 
 def test_a_participant_from_the_invitation_to_the_replay(
@@ -150,7 +131,7 @@ def test_every_page_is_fit_for_all(browser: webdriver.Chrome, service: Service) 
     for name, paths in people.items():
         browser.delete_all_cookies()
         if name:
-            login(browser, service, name)
+            login(browser, service.url, name, PASSWORD)
         for path in paths:
             for size, night in ((DESKTOP, False), (DESKTOP, True), (PHONE, False)):
                 browser.set_window_size(*size)
