@@ -134,6 +134,10 @@ class Phase(Base):
         """Whether the phase is over at a time."""
         return self.closes is not None and at >= self.closes
 
+    def left(self, at: float) -> float | None:
+        """Return for how many seconds the phase is still open; None if it is not, or has no end."""
+        return self.closes - at if self.closes is not None and self.is_open(at) else None
+
 
 class Submission(Base):
     """A submission of a team to a phase.

@@ -128,7 +128,6 @@ def phase_document(service: Service, row: Phase, at: float) -> dict[str, Any]:
         "opens": iso(row.opens),
         "closes": iso(row.closes),
         "state": "closed" if row.is_closed(at) else "open" if row.is_open(at) else "to come",
-        "left": row.closes - at if row.closes is not None and row.is_open(at) else None,
         "trials": len(phase.numbers),
         "limits": phase.model.limits.model_dump(),
         "quota": phase.quota.model_dump(),

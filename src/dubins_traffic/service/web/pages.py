@@ -93,6 +93,9 @@ class Pages(Controller):
         with service.database.reading() as session:
             rows = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
             documents = [viewing.competition_document(service, row) for row in rows]
+            for row, document in zip(rows, documents, strict=True):
+                for phase, shown in zip(row.phases, document["phases"], strict=True):
+                    shown["left"] = phase.left(service.clock())
         return page(service, viewer, "home", "Competitions", competitions=documents)
 
     @get("/c/{slug:str}", sync_to_thread=True)
@@ -102,6 +105,7 @@ class Pages(Controller):
             row = receiving.competition_named(session, slug)
             document, news = viewing.competition_document(service, row), viewing.news(session, row)
             for phase, shown in zip(row.phases, document["phases"], strict=True):
+                shown["left"] = phase.left(service.clock())
                 _, shown["places"] = viewing.latest_places(service, session, phase, viewer.account)
                 shown["replays"] = comparing.replays(service, session, phase, shown["places"], viewer.account)
             line = comparing.timeline(row.phases, service.clock())
