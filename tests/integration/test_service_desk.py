@@ -208,6 +208,14 @@ def test_baselines_stand_apart_and_a_phase_opens_again_until_its_reveal(
         assert organiser.post(f"{act}/{done}", form=f"{act}/{done}").status_code == 303
     assert organiser.post(f"{act}/reopen", form=DESK, until="2040-01-01T00:00").status_code == 409
     assert edited(organiser, test__closes="2041-01-01T00:00:00Z") == 409
+    closed = form_of(organiser)["test closes"]
+    for title, closes, status in (("By file", closed, 303), ("Late", "2042-01-01T00:00:00Z", 409)):
+        text = competition_text(closes="2037-01-01T00:00:00Z").replace("A <b>short</b> season", title)
+        before, after = text.split("[phases.test]")
+        after = re.sub("closes = .*", f"closes = {closes}", after)
+        files = {"files": ("competition.toml", f"{before}[phases.test]{after}".encode())}
+        assert organiser.post("/desk/file/short", form=EDIT, files=files).status_code == status
+        assert form_of(organiser)["title"] == "By file"
     said = log(organiser)
     assert all(f"<td>{word}</td>" in said for word in ("baseline", "close", "re-open", "reveal"))
 

@@ -43,6 +43,13 @@ class Change(NamedTuple):
         return f"{self.field}: {_said(self.before)} -> {_said(self.after)}"
 
     @property
+    def same(self) -> bool:
+        """Whether nothing changes; dates are told to the second, and so are they compared."""
+        if self.date and self.before is not None and self.after is not None:
+            return seconds(self.before) == seconds(self.after)
+        return self.before == self.after
+
+    @property
     def locked(self) -> bool:
         """Whether it decides trials or places, or what is shown of them, so that it stays as it was begun with."""
         return EDITABLE.fullmatch(self.field) is None
@@ -68,11 +75,8 @@ def changes(service: Service, row: Competition, other: Loaded) -> list[Change]:
     """Return in what a competition file differs from the competition as it is now."""
     now = Loaded.from_document(present(service, row), row.slug, service.place(row.slug))
     before, after = _flat(now), _flat(other)
-    return [
-        Change(name, before.get(name), after.get(name))
-        for name in dict.fromkeys((*before, *after))
-        if before.get(name) != after.get(name)
-    ]
+    found = [Change(name, before.get(name), after.get(name)) for name in dict.fromkeys((*before, *after))]
+    return [change for change in found if not change.same]
 
 
 def edit(

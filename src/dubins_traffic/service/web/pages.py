@@ -75,6 +75,7 @@ def asked(
     return page(service, viewer, "confirm", title, **given)
 
 
+MINUTE, HOUR = 60, 3600
 REPLAY_POLICY = (
     "sandbox allow-scripts; default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
@@ -115,7 +116,7 @@ class Pages(Controller):
     @get("/trial.svg", sync_to_thread=True)
     def moving_trial(self) -> Response[str]:
         """Return a trial that moves; `scripts.moving_trial` makes it."""
-        return _picture(part("service/web/static/trial.svg"))
+        return _picture(part("service/web/static/trial.svg"), HOUR)
 
     @get("/c/{slug:str}/{name:str}", sync_to_thread=True)
     def phase(
@@ -133,6 +134,8 @@ class Pages(Controller):
                     viewing.submission_document(service, session, one, None, places, logs=False)
                     for one in its_submissions
                 ]
+                for one in mine:
+                    one["wait"] = comparing.wait_of(session, one["place"], at)
                 used = submissions.used(session, row, account.team_id, at)
             title, steps = (
                 row.competition.title,
@@ -261,7 +264,7 @@ class Pages(Controller):
         self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
     ) -> Response[str]:
         """Return a small map of a trial with the ways of its cars."""
-        return _picture(pictures.map_of(_replay(service, viewer, number, trial)))
+        return _picture(pictures.map_of(_replay(service, viewer, number, trial)), MINUTE)
 
     @get("/status", sync_to_thread=True)
     def status(self, service: ServiceHere, viewer: ViewerHere) -> Template:
@@ -283,9 +286,9 @@ def _replay(service: Service, viewer: Viewer, number: int, trial: int) -> bytes:
     return hiding.show(service.storage.get(digest, "replays"), replays_of(row_of_trial))
 
 
-def _picture(drawn: str) -> Response[str]:
-    """Return a picture, which the browser of who asks may keep a while."""
-    headers = {"content-security-policy": pictures.POLICY, "cache-control": "private, max-age=3600"}
+def _picture(drawn: str, seconds: int) -> Response[str]:
+    """Return a picture, which the browser of who asks may keep for so long."""
+    headers = {"content-security-policy": pictures.POLICY, "cache-control": f"private, max-age={seconds}"}
     return Response(drawn, media_type="image/svg+xml", headers=headers)
 
 
