@@ -76,7 +76,7 @@ def test_texts_dates_and_quotas_change_with_a_line_each(service: Service, organi
     for field in ("title", "about", "phases.test.closes", "phases.test.quota.a_day", "pages.prizes"):
         assert f"<td>{field}: " in said, field
     assert "10 -&gt; nothing" in said
-    assert edited(organiser, page__prizes="") == 303
+    assert edited(organiser, **{"page: prizes": ""}) == 303
     assert service.person().get("/pages/short/prizes").status_code == 404
 
 

@@ -79,6 +79,7 @@ def test_the_podium_is_run_again_once(service: Service) -> None:
     with service.database.writing() as session:
         phase, made = phase_with(session, "done", "done")
         places = [{"place": 1, "submission": made[0].id}, {"place": 4, "submission": made[1].id}]
+        places.append({"place": None, "submission": made[1].id})
         session.add(Standing(phase_id=phase.id, at=1.0, version=0, places=places))
         made[0].state = "running"
     for _ in range(2):

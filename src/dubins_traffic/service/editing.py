@@ -126,7 +126,7 @@ def edited_by_form(document: dict[str, Any], form: Mapping[str, str]) -> dict[st
     """Return a document with what the form of the desk says: texts, dates, quotas; an empty page is removed."""
     for name in ("title", "about"):
         document[name] = form.get(name, document.get(name, ""))
-    pages = {name: form.get(f"page {name}", text) for name, text in document.get("pages", {}).items()}
+    pages = {name: form.get(f"page: {name}", text) for name, text in document.get("pages", {}).items()}
     if form.get("new page", "").strip():
         pages[form["new page"].strip()] = form.get("new text", "")
     document["pages"] = {name: text for name, text in pages.items() if text.strip()}
