@@ -59,6 +59,11 @@ CLAIMS: Mapping[str, Claim] = {
         "task.md",
         "some minutes",
     ),
+    "former": Claim(
+        "`rules` is clean on the instances of edition 2, judged by edition 3, and makes as many rounds",
+        "rules.md#why",
+        "two minutes",
+    ),
     "lanes": Claim(
         "`lanes` makes the rounds of free flow, alone and among wandering cars", "task.md", "some minutes"
     ),
