@@ -33,6 +33,7 @@ def _shown(submission: Submission, trial: Trial, metric: str) -> dict[str, Any]:
         "run": submission.run,
         "number": trial.number,
         "end": trial.end,
+        "metric": metric,
         "value": value(trial.row, metric),
         "map": trial.replay is not None,
     }
