@@ -100,8 +100,8 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
         half = half_across(b, j, px, py, state, vehicle)
         if vehicle.middle < left < 4.0 * vehicle.middle:
             edge = left - half
-            # While they pass each other an ego may come as far over the line as it may at all.
-            if j == EGO and leans(vehicle):
+            # While they pass each other who is beside it may come as far over the line as it may at all.
+            if leans(vehicle):
                 edge = min(edge, vehicle.middle - vehicle.over)
             offset = min(offset, edge - clear)
     return max(offset, EDGE - vehicle.middle)

@@ -312,7 +312,8 @@ def wanted_gap(
     its = np.int64(labels.bits[b, who])
     _, _, _, px, py = on_way(way, state.x[b, who], state.y[b, who])
     along = state.c[b, who] * px + state.s[b, who] * py
-    stands_facing = labels.crosses[b, n] >= 0 and abs(state.speed[b, who]) < BRISK
+    ahead = labels.lane[b, who] == car.next_lane or labels.lane[b, who] == car.lane
+    stands_facing = labels.crosses[b, n] >= 0 and (abs(state.speed[b, who]) < BRISK or ahead)
     if along < -0.3 and labels.crosses[b, who] < 0 and not stands_facing:
         return FACING_GAP if labels.bits[b, n] & FLAG.LEFT == 0 else MOVING_GAP
     in_disc = labels.crosses[b, n] >= 0
