@@ -17,10 +17,10 @@ import pytest
 from sqlalchemy import select
 
 from dubins_traffic.competition.sealing import make_key_file
-from dubins_traffic.errors import InputError
 from dubins_traffic.service import viewing
 from dubins_traffic.service.database_tables import Phase, Submission, Trial
 from dubins_traffic.service.hiding import HiddenError
+from dubins_traffic.service.service import NoKeyError
 from dubins_traffic.service.service import Service as StoredService
 from tests import postgres
 from tests.services import CRASHING, Person, competition_text, serving, wait_until
@@ -164,8 +164,13 @@ def shown_to_organisers(organiser: Person, number: int) -> None:
 
 def unreadable(folder: Path, other: Path, number: int) -> None:
     """With another key nothing can be read, and nothing of one trial stands for another."""
-    with pytest.raises(InputError, match="no such key, and the folder has competitions"):
-        StoredService(folder, other)
+    keyless = StoredService(folder, other)
+    with keyless.database.reading() as session:
+        assert [row.name for row in keyless.waiting_for_key(session)] == list(SECRET)
+        with pytest.raises(NoKeyError, match="no key for what is secret"):
+            viewing.trial_of(keyless, session, session.get_one(Submission, number), 0)
+    keyless.close()
+    assert not other.exists()
     make_key_file(other, folder)
     stored, own = StoredService(folder, other), StoredService(folder, folder.with_suffix(".key"))
     with stored.database.reading() as session:

@@ -93,6 +93,7 @@ def phase_document(service: Service, row: Phase, at: float) -> dict[str, Any]:
         "ranking": phase.ranking.model_dump(),
         "commitment": row.commitment,
         "revealed": iso(row.revealed),
+        "waits_for_key": service.waits_for_key(row),
     }
 
 

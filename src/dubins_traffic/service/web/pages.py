@@ -17,6 +17,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.competition import sealing
+from dubins_traffic.competition.competition import WALL_S
 from dubins_traffic.service import accounts, queue, receiving, standings, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.database_tables import (
@@ -102,8 +103,9 @@ class Pages(Controller):
                 used = submissions.used(session, row, account.team_id, at)
             title = row.competition.title
         given = {"phase": document, "own": mine, "used": used, "slug": slug, "competition": title}
+        largest = service.settings.largest_upload
         return page(
-            service, viewer, "phase", f"{title}: {name}", largest=service.settings.largest_upload, **given
+            service, viewer, "phase", f"{title}: {name}", largest=largest, wall_bounds=WALL_S, **given
         )
 
     @get("/c/{slug:str}/{name:str}/table", sync_to_thread=True)
