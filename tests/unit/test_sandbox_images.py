@@ -24,8 +24,9 @@ def test_images_that_nobody_uses_are_removed(tmp_path: Path, monkeypatch: pytest
         (tmp_path / name).write_text(name)
     for name in ("unused", "used"):
         roots.append(Path(images.unpacked(tmp_path / name, store).root))
-        long_ago = time.time() - images.KEPT_S - 60.0
-        os.utime(roots[-1].parent, (long_ago, long_ago))
+    long_ago = time.time() - images.KEPT_S - 60.0
+    for root in roots:
+        os.utime(root.parent, (long_ago, long_ago))
     images.unpacked(tmp_path / "used", store)
     assert all(root.is_dir() for root in roots)
     images.unpacked(tmp_path / "new", store)
