@@ -47,7 +47,9 @@ def world(grid: tuple[int, int], length: float, agents: list[dict[str, Any]], **
 
 
 FREE: Final = [{"type": "free", "name": "free", "count": 2}]
-WAITING: Final = world((2, 2), 3.5, FREE, rules={"gap_rounds": 24.0}, duration=600)
+SOON: Final = {"rest_time": 15.0, "journey_start_time": 8.0, "goal_time": 20.0, "gap_rounds": 9.0}
+"""Limits by which all that others may do to make the ego wait is over after 180 s: so 240 s show it."""
+WAITING: Final = world((2, 2), 3.5, FREE, rules=SOON, duration=240)
 PROVOKING: Final = world((2, 3), 4.0, [{"type": "lawful", "name": "lawful", "count": 4}], duration=120)
 AMONG_FREE: Final = world(
     (2, 3), 4.0, [*FREE, {"type": "lawful", "name": "lawful"}], rules={"gap_rounds": 4.0}, duration=120
@@ -67,7 +69,7 @@ class Wanted:
 
 SEARCHES: Final = {
     "rules": Wanted(
-        "rules", WAITING, BLOCKED, "`rules` between two free cars on a ring of four bends, trials of 600 s"
+        "rules", WAITING, BLOCKED, "`rules` between two free cars on a ring of four bends, trials of 240 s"
     ),
     "lanes": Wanted("lanes+shield", WAITING, BLOCKED, "`lanes+shield`, the same"),
     "egos": Wanted(

@@ -107,7 +107,7 @@ def counted() -> dict[str, Any]:
     ticks = range(int(CONFIG["duration"] * CONFIG["rate"]))
     actions = [np.array([0.9, 0.4 * np.sin(0.035 * k)], dtype=np.float32) for k in ticks]
     told = [one.step(action)[4] for action in actions]
-    rows = [many.step(np.stack([action, action]))[4]["cost"][1] for action in actions]
+    rows = [many.step(np.stack([action, action]))[4]["costs"][1] for action in actions]
     names = rows[0].dtype.names
     score = told[-1]["outcome"].score
     of_it = [own for own in score.verdict.violations if own.rule == NAME]
@@ -115,9 +115,9 @@ def counted() -> dict[str, Any]:
     return {
         "sentences": [sentence_of(record, score, own) for own in of_it[-1:]],
         "expected": [cell.rule for cell in possible([told[-1]["trial"]])],
-        "single": _sum(own["cost"] for own in told),
+        "single": _sum(own["costs"] for own in told),
         "vector": _sum(dict(zip(names, row.tolist(), strict=True)) for row in rows),
-        "agents": _sum(agents.step({"ego_0": action})[4]["ego_0"]["cost"] for action in actions),
+        "agents": _sum(agents.step({"ego_0": action})[4]["ego_0"]["costs"] for action in actions),
         "verdict": Counter(own.rule for own in score.verdict.violations if own.tick > 0),
     }
 

@@ -8,10 +8,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from selenium import webdriver
+from selenium.webdriver.common.by import By
+from selenium.webdriver.common.keys import Keys
+from selenium.webdriver.support.wait import WebDriverWait
 
 from tests.tools import need_programs
 
 AXE = Path(__file__).parent / "vendor" / "axe.min.js"
+WAIT_S = 600
+"""How long a test waits for what a page must show."""
 FLAGS = (
     "--headless=new --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
     "--disable-component-update --disable-sync"
@@ -40,6 +45,25 @@ def browsing(
         yield driver
     finally:
         driver.quit()
+
+
+def fill(browser: webdriver.Chrome, **fields: str) -> None:
+    """Fill in fields by their ids, and send the form by the Enter key."""
+    last = None
+    for name, value in fields.items():
+        last = browser.find_element(By.ID, name)
+        last.clear()
+        last.send_keys(value)
+    assert last is not None
+    last.send_keys(Keys.ENTER)
+
+
+def login(browser: webdriver.Chrome, url: str, name: str, password: str) -> None:
+    """Log in at the service of an address as nobody else."""
+    browser.delete_all_cookies()
+    browser.get(f"{url}/login")
+    fill(browser, name=name, password=password)
+    WebDriverWait(browser, WAIT_S).until(lambda _: browser.current_url == f"{url}/")
 
 
 def faults(browser: webdriver.Chrome, *rules: str) -> list[str]:

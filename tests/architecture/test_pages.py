@@ -4,7 +4,7 @@ import re
 
 import pytest
 
-from dubins_traffic.viewer.pages import environment
+from dubins_traffic.service.texts import templates
 from tests.architecture.house import PACKAGE, modules
 
 MARKUP = re.compile(
@@ -18,5 +18,4 @@ def test_no_module_holds_markup() -> None:
 
 @pytest.mark.parametrize("path", sorted(PACKAGE.rglob("*.html")), ids=lambda path: path.name)
 def test_every_template_is_one(path: object) -> None:
-    environment().filters.setdefault("moment", str)
-    environment().get_template(str(path).removeprefix(f"{PACKAGE}/"))
+    templates().get_template(str(path).removeprefix(f"{PACKAGE}/"))

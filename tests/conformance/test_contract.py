@@ -32,7 +32,7 @@ FELL = {
     "ego_closes": (29, 44),
     "ego_tilted": (10, 14, 16, 20, 29, 34, 38, 40),
     "ego_in_bend": (29,),
-    "ego_whims": (14, 16, 22, 50, 52),
+    "ego_whims": (10, 14, 16, 22, 27, 28, 34, 40, 46, 50, 52, 58),
 }
 """Trials beyond the first ones in which the bar once did not hold."""
 SECONDS = 300.0 if FULL else None

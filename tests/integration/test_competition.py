@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import re
 import resource
 import shutil
 import signal
@@ -22,6 +23,7 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.competition.competition import Competition, load_competition
 from dubins_traffic.competition.judging import RESULTS, FramesHash, Judged, evaluate, judge, load_evaluation
 from dubins_traffic.competition.ranking import rank
+from dubins_traffic.competition.rehearsal import Rehearsed
 from dubins_traffic.competition.sealing import seal
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.competition.templates import template_files, write_template
@@ -31,6 +33,7 @@ from dubins_traffic.runs.single import run_trial
 from tests.boxes import needs_boxes
 from tests.competitions import CONTROLLERS, IDLE, KEY, PRACTICE, ROAD, TEST, competition
 from tests.ros import need_compiler
+from tests.services import competition_text
 
 ROOT = Path(__file__).parents[2]
 SHORT = {**ROAD, "duration": 6}
@@ -245,6 +248,30 @@ def test_a_season_on_the_command_line(
 
 
 @needs_boxes
+def test_a_rehearsal_goes_through_all_phases_and_tells_the_load(
+    command: Callable[..., subprocess.CompletedProcess[str]], tmp_path: Path
+) -> None:
+    (tmp_path / "competition.toml").write_text(competition_text(3))
+    given = ("--trials", "2", "--trust-submissions", "--teams", "3", "--submissions", "1000")
+    ran = command("competition", "rehearse", ".", "--controller", "simple", *given)
+    assert ran.returncode == 0, ran.stderr
+    *each, heading, _practice, _validation, _test, season = ran.stdout.splitlines()
+    phases = load_competition(tmp_path).phases
+    assert [line.split(" s each")[0].rpartition(", ")[0] for line in each] == [
+        f"{phase.name}: simple: 2 trials" for phase in phases
+    ]
+    assert heading.startswith("With 3 teams, each with 1000 submissions")
+    assert re.fullmatch(r"The season's load takes [\d.]+ (s|minutes|hours|days) on 1 such workers\.", season)
+    assert list(tmp_path.iterdir()) == [tmp_path / "competition.toml"]
+
+
+def test_a_load_is_that_of_the_trials_and_those_run_again_within_the_quota(tmp_path: Path) -> None:
+    (tmp_path / "competition.toml").write_text(competition_text(3))
+    practice, _, test = load_competition(tmp_path).phases
+    assert Rehearsed(practice, "simple", 2, 0.5, ()).load(100) == 100 * (3 + 1) * 0.5
+    assert Rehearsed(test, "simple", 2, 0.5, ()).load(100) == 10 * (3 + 1) * 0.5
+
+
 def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     (tmp_path / "entry").write_text(CONTROLLERS["speaks_lines"])
     shutil.copytree(ROOT / "examples" / "competition", tmp_path / "spring")

@@ -100,6 +100,7 @@ ASKED = (
     Asked("competition check spring"),
     Asked("evaluate entry --competition spring --trust-submissions -o ev", once=True),
     Asked("competition rank spring --phase practice ev", once=True),
+    Asked("competition rehearse spring --controller simple --trials 1 --trust-submissions", once=True),
     Asked("regress cases --controller rules", once=True),
     Asked("shrink cases/one.json --controller lanes -o small.json", once=True),
     Asked("suite list"),

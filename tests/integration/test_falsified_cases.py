@@ -3,13 +3,15 @@
 from pathlib import Path
 
 import pytest
+from experiments.free_egos import Free
 
 from dubins_traffic.falsification.regress import cases_in, outcomes
 from tests.contract_drivers import AsEgo, Stands
 
 CASES = Path(__file__).parents[1] / "cases"
 CONTRACT = CASES / "contract"
-"""What broke the contract once: who blocked `rules`, and who was provoked by an ego that stands."""
+"""What broke the contract once: who blocked `rules`, and who was provoked by an ego that stands, or that does
+anything under the shield."""
 
 
 def test_rules_passes_the_cases_of_its_mutants() -> None:
@@ -32,6 +34,13 @@ def test_rules_gets_past_who_stands_askew_beside_it() -> None:
 def test_who_keeps_the_law_goes_up_to_the_line_of_a_crossing_that_is_full() -> None:
     """It waited so far before it that E5 asked it to come on (`crossing_degree` 1)."""
     found = list(outcomes(cases_in(CONTRACT / "provoked"), lambda: AsEgo(Stands())))
+    assert [own.file.name for own in found if not own.passed] == []
+
+
+def test_who_keeps_the_law_leaves_discs_in_time_beside_an_ego_that_does_as_it_likes() -> None:
+    """It kept 0.8 m from an ego that turned beyond its exit, or waited for who stood beside its way (E4)."""
+    found = list(outcomes(cases_in(CONTRACT / "egos"), Free))
+    assert len(found) == 8
     assert [own.file.name for own in found if not own.passed] == []
 
 

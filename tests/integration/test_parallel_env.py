@@ -142,8 +142,8 @@ def test_a_shield_leaves_nothing_to_charge_and_says_when_it_steps_in() -> None:
         for _, _, _, _, infos, _ in driven(env, seed)[1:]:
             total += sum(info["interventions"] for info in infos.values())
             for name, info in infos.items():
-                assert info["cost"].get("E1", 0.0) == info["cost"].get("E2", 0.0) == 0.0, name
-                assert name != "ego_0" or not any(info["cost"].values())
+                assert info["costs"].get("E1", 0.0) == info["costs"].get("E2", 0.0) == 0.0, name
+                assert name != "ego_0" or not any(info["costs"].values())
     assert total > 500
 
 
@@ -153,7 +153,7 @@ def test_a_shield_on_one_side_leaves_the_other_alone() -> None:
     )
     steps = driven(env, 1)[1:]
     assert all(("interventions" in info) == (name != "ego_0") for name, info in steps[0][4].items())
-    assert sum(sum(step[4]["ego_0"]["cost"].values()) for step in steps) > 0
+    assert sum(sum(step[4]["ego_0"]["costs"].values()) for step in steps) > 0
     assert steps[-1][4]["car_1"]["broke_first"] == "ego_0"
 
 
@@ -164,7 +164,7 @@ def test_e_agents_are_charged_until_the_ego_has_broken_its_part_and_the_ego_is_e
         first = None
         for _, rewards, _, _, infos, _ in driven(env, seed)[1:]:
             now = infos["ego_0"]["broke_first"]
-            costs = {name: sum(info["cost"].values()) for name, info in infos.items()}
+            costs = {name: sum(info["costs"].values()) for name, info in infos.items()}
             if first is not None:
                 assert costs["ego_0"] == 0.0 or first == "ego_0"
                 assert first != "ego_0" or all(costs[name] == 0.0 for name in costs if name != "ego_0")
@@ -192,7 +192,7 @@ def test_peers_go_round_the_goals_themselves() -> None:
     assert sum(terms["visits"] for terms in own) % 3.0 == 0.0
     assert sum(terms["visits"] for terms in own) > 0.0
     assert all(terms["E1"] == 0.0 for terms in own)
-    assert any(step[4]["car_1"]["cost"]["E1"] for step in steps)
+    assert any(step[4]["car_1"]["costs"]["E1"] for step in steps)
 
 
 def test_agents_are_told_where_the_ego_is_and_goes() -> None:

@@ -119,7 +119,8 @@ def seen(person: Person, numbers: list[int]) -> dict[str, str]:
         "/c/short/test/table",
         *(f"/s/{n}{tail}" for n in numbers for tail in ("", "/live")),
     ]
-    paths += [f"/s/{n}/trials/0{tail}" for n in numbers for tail in ("", "/replay")]
+    paths += [f"/s/{n}/trials/0{tail}" for n in numbers for tail in ("", "/replay", "/map.svg")]
+    paths += ["/team", f"/s/{numbers[0]}/beside?other={numbers[1]}", "/c/short/test/table.csv"]
     pages = {path: person.get(path).text for path in paths}
     for path in (
         *(f"/submissions/{n}{tail}" for n in numbers for tail in ("", "/logs")),

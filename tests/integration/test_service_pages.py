@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,13 +13,12 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.browser import browsing, dark, faults
-from tests.services import CRASHING, PASSWORD, STANDING, Service, competition_text, serving
+from tests.browser import WAIT_S, browsing, dark, faults, fill, login
+from tests.services import CIRCLING, CRASHING, PASSWORD, STANDING, Service, competition_text, serving
 
 pytestmark = pytest.mark.tools("browser")
 
 NASTY = "<img src=x onerror=window.broken=1>"
-WAIT_S = 600
 PHONE, DESKTOP = (390, 844), (1280, 900)
 
 
@@ -35,24 +35,6 @@ def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
 def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chrome]:
     with browsing(tmp_path_factory.mktemp("profile"), height=900) as driver:
         yield driver
-
-
-def fill(browser: webdriver.Chrome, **fields: str) -> None:
-    """Fill in fields by their ids, and send the form by the Enter key."""
-    last = None
-    for name, value in fields.items():
-        last = browser.find_element(By.ID, name)
-        last.clear()
-        last.send_keys(value)
-    assert last is not None
-    last.send_keys(Keys.ENTER)
-
-
-def login(browser: webdriver.Chrome, service: Service, name: str) -> None:
-    browser.delete_all_cookies()
-    browser.get(f"{service.url}/login")
-    fill(browser, name=name, password=PASSWORD)
-    WebDriverWait(browser, WAIT_S).until(lambda _: browser.current_url == f"{service.url}/")
 
 
 def test_a_participant_from_the_invitation_to_the_replay(
@@ -105,8 +87,14 @@ def test_every_page_is_fit_for_all(browser: webdriver.Chrome, service: Service) 
     """No serious fault by axe in the light, in the dark and on a phone; nothing wider than it; no script in names."""
     organiser = service.organiser()
     person = service.person().join(organiser.invite(), "Ann", "Ants")
-    number = person.submit("short/practice", CRASHING)
-    person.ended(number)
+    number, other = (person.submit("short/practice", text) for text in (CRASHING, CIRCLING))
+    for one in (number, other):
+        person.ended(one)
+    texts = {"title": "Rain", "text": "Roads are *wet*.\n\n|a|b|\n|-|-|\n|1|2|"}
+    assert organiser.post("/desk/news/short", form="/desk/c/short", **texts).status_code == 303
+    text = competition_text().replace("version = 0", 'version = 0\npages = {rules = "# Fair\\n\\n- play"}')
+    files = {"files": ("competition.toml", text.encode())}
+    assert organiser.post("/desk/file/short", form="/desk/edit/short", files=files).status_code == 303
     people = {
         "": (
             "/",
@@ -116,17 +104,34 @@ def test_every_page_is_fit_for_all(browser: webdriver.Chrome, service: Service) 
             "/c/short",
             "/c/short/practice",
             "/c/short/practice/table",
+            "/pages/short/rules",
             "/status",
             "/none",
         ),
-        "Ann": ("/c/short/practice", f"/s/{number}", f"/s/{number}/trials/0", "/team"),
-        "Olga": ("/desk", "/desk/c/short", "/desk/log", "/status"),
+        "Ann": (
+            "/c/short",
+            "/c/short/practice",
+            f"/s/{other}",
+            f"/s/{other}/beside?other={number}",
+            f"/s/{number}/trials/0",
+            "/team",
+        ),
+        "Olga": (
+            "/c/short",
+            "/desk",
+            "/desk/c/short",
+            "/desk/edit/short",
+            "/desk/c/short/test/close",
+            "/desk/s/1/disqualify?why=x",
+            "/desk/log",
+            "/status",
+        ),
     }
     found: dict[str, list[str]] = {}
     for name, paths in people.items():
         browser.delete_all_cookies()
         if name:
-            login(browser, service, name)
+            login(browser, service.url, name, PASSWORD)
         for path in paths:
             for size, night in ((DESKTOP, False), (DESKTOP, True), (PHONE, False)):
                 browser.set_window_size(*size)
@@ -137,10 +142,8 @@ def test_every_page_is_fit_for_all(browser: webdriver.Chrome, service: Service) 
                     wrong.append(f"wider than {size[0]} pixels")
                 if wrong:
                     found[f"{path} {name} {size} {'dark' if night else 'light'}"] = wrong
-                shot(
-                    browser,
-                    f"{path.strip('/').replace('/', '-') or 'home'}-{size[0]}-{'dark' if night else 'light'}",
-                )
+                where = re.sub(r"[/?=]", "-", path.strip("/")) or "home"
+                shot(browser, f"{name}-{where}-{size[0]}-{'dark' if night else 'light'}")
             assert browser.execute_script("return window.broken === undefined")
     dark(browser, False)
     assert found == {}

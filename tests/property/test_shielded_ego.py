@@ -61,18 +61,18 @@ def test_it_does_what_the_controller_does_under_the_shield(
     assert np.array_equal(one.x, other.x)
     assert np.array_equal(one.c, other.c)
     if not disturbances:
-        assert not any(told["cost"][name] for told in infos for name in told["cost"])
+        assert not any(told["costs"][name] for told in infos for name in told["costs"])
 
 
 def test_episodes_before_the_shield_are_not_under_it() -> None:
     bare = single(RULED, frame_skip=5)
     _, infos = driven(bare)
     assert not any("interventions" in told for told in infos)
-    assert any(sum(told["cost"].values()) for told in infos)
+    assert any(sum(told["costs"].values()) for told in infos)
     with pytest.raises(DubinsTrafficError, match="not under a shield"):
         _ = bare.given
     _, infos = driven(ShieldedEgo(bare))
-    assert not any(sum(told["cost"].values()) for told in infos)
+    assert not any(sum(told["costs"].values()) for told in infos)
 
 
 def test_what_can_be_under_no_shield_is_said() -> None:

@@ -69,7 +69,11 @@ def test_terms_and_costs_are_what_the_score_counts() -> None:
         own = np.array([info["reward_terms"][name] for name in TERMS])
         assert reward == pytest.approx(own.sum(axis=0))
         terms += own
-        costs += np.array([info["cost"][name] for name in COSTS])
+        counted = np.array([info["costs"][name] for name in COSTS])
+        assert (
+            info["cost"].tolist() == counted[[name != "1.collision" for name in COSTS]].sum(axis=0).tolist()
+        )
+        costs += counted
         step += 1
     assert over.all()
     for k, outcome in enumerate(info["outcome"]):
@@ -219,7 +223,9 @@ def test_who_is_hit_while_it_stands_is_not_at_fault() -> None:
         while not terminated:
             *_, terminated, truncated, info = env.step(np.array([speed, 0.0]))
             assert not truncated
-        assert (info["cost"]["1.collision"], info["cost"]["at_fault"]) == (1.0, fault)
+        assert (info["costs"]["1.collision"], info["costs"]["at_fault"]) == (1.0, fault)
+        others = sum(info["costs"][name] for name in COSTS if name not in ("1.collision", "at_fault"))
+        assert info["cost"] == others + fault
         (collision,) = info["outcome"].score.collisions
         assert collision.at_fault == bool(fault)
 
@@ -242,7 +248,7 @@ def test_an_action_of_another_shape_is_refused(action: Any) -> None:
     with pytest.raises(InputError, match=r"action: not an action.*Box, shape \(2,\), for each of 1"):
         agents.step({"ego_0": action})
     assert (one.fleet.board.arrays["asked"] == before).all()
-    assert one.step([0.5, 0.5])[4]["cost"]
+    assert one.step([0.5, 0.5])[4]["costs"]
 
 
 @pytest.mark.parametrize("actions", [(step for step in range(2)), {0.5}, object(), np.array(0.5), "up"])

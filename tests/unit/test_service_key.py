@@ -11,8 +11,8 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.competition import Quota
-from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions
-from dubins_traffic.service.database_tables import Account, Submission
+from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions, viewing
+from dubins_traffic.service.database_tables import Account, Phase, Submission
 from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import Upload
 from dubins_traffic.service.web.app import create_app
@@ -83,6 +83,16 @@ def test_without_the_key_submissions_are_taken_and_wait_until_it_is_there(tmp_pa
     with keyless.database.reading() as session:
         states = dict(session.execute(select(Submission.id, Submission.state)).all())
         assert states[1] == "queued"
+        document = viewing.submission_document(keyless, session, session.get_one(Submission, 1), None, {})
+        assert document["active"]
+        names = [
+            viewing.phase_document(keyless, row, NOW)["waits_for_key"]
+            for row in session.scalars(select(Phase))
+        ]
+        assert names == [False, True, True]
+    with TestClient(create_app(keyless)) as client:
+        assert {client.get(path).status_code for path in ("/", "/c/short", "/c/short/validation")} == {200}
+        assert "the organiser has yet to give the service the key" in client.get("/c/short/test").text
     (tmp_path / "elsewhere.key").rename(key)
     with keyless.database.writing() as session:
         assert keyless.waiting_for_key(session) == []

@@ -233,14 +233,8 @@ def _ray_slab(u: float, v: float, eu: float, ev: float, a: float, b: float) -> f
 
 @jit
 def scan(
-    b: int,
-    viewer: int,
-    shortest: float,
-    longest: float,
-    rays: Rows[Ray],
-    ranges: Floats,
-    around: Surroundings,
-) -> None:
+    b: int, viewer: int, shortest: float, longest: float, rays: Rows[Ray], ranges: Floats, around: Surroundings
+) -> None:  # fmt: skip
     """Write the laser ranges of car `viewer` (index) in metres into `ranges` (R,).
 
     As in REP 117 of ROS, of the rays `rays` (R,) one that meets nothing within `longest` (m) reads +inf, and one that

@@ -30,6 +30,7 @@ VERIFY_EXAMPLES = options.examples(
 RANK_EXAMPLES = options.examples(
     "competition rank spring --phase practice ada=evaluations/a bob=evaluations/b"
 )
+REHEARSE_EXAMPLES = options.examples("competition rehearse spring --workers 4 --teams 20 --submissions 30")
 
 competition = typer.Typer(
     help="A competition from one file: phases, secret seeds, places with error bars.", no_args_is_help=True
@@ -178,6 +179,52 @@ def rank(
         print(json_text.dumps(ranking_document(found, own), indent=2))
     else:
         _show(places, own)
+
+
+@competition.command("rehearse", epilog=REHEARSE_EXAMPLES)
+def rehearse(
+    file: File,
+    controllers: Annotated[
+        list[str], typer.Option("--controller", metavar="NAME", help="Built-in; may be given several times.")
+    ] = ["lanes", "rules", "simple"],  # noqa: B006
+    trials: Annotated[
+        int, typer.Option("--trials", metavar="N", min=1, help="Trials of each configuration.")
+    ] = 4,
+    workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.")] = 1,
+    teams: Annotated[int, typer.Option("--teams", metavar="N", min=1, help="Teams of the season.")] = 10,
+    submissions: Annotated[
+        int, typer.Option("--submissions", metavar="N", min=1, help="Those of a team to a phase.")
+    ] = 10,
+    trust: Annotated[
+        bool,
+        typer.Option("--trust-submissions", help="Go on where this machine can't enforce all limits."),
+    ] = False,
+) -> None:
+    """Send built-in controllers through all phases, and say how long the season's load will take on such workers."""
+    from dubins_traffic.competition.competition import load_competition
+    from dubins_traffic.competition.rehearsal import rehearse as rehearsed
+
+    loads: dict[str, float] = {}
+    for own in rehearsed(load_competition(file), controllers, trials=trials, workers=workers, trust=trust):
+        told = f", ended by {', '.join(own.faults)}" if own.faults else ""
+        print(
+            f"{own.phase.name}: {own.controller}: {own.trials} trials, {own.seconds:.2f} s each{told}",
+            flush=True,
+        )
+        loads[own.phase.name] = max(loads.get(own.phase.name, 0.0), teams * own.load(submissions))
+    print(
+        f"With {teams} teams, each with {submissions} submissions to a phase as slow as the slowest of these:"
+    )
+    for name, seconds in loads.items():
+        print(f"  {name}: {_hours(seconds / workers)}")
+    print(f"The season's load takes {_hours(sum(loads.values()) / workers)} on {workers} such workers.")
+
+
+def _hours(seconds: float) -> str:
+    for unit, size in (("days", 86400.0), ("hours", 3600.0), ("minutes", 60.0)):
+        if seconds >= 2.0 * size:
+            return f"{seconds / size:.1f} {unit}"
+    return f"{seconds:.0f} s"
 
 
 def _phase(file: str, name: str) -> Phase:

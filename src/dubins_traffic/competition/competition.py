@@ -178,7 +178,10 @@ class CompetitionModel(Strict):
 
     version: Annotated[int, Field(ge=0, le=0)] = Field(description="0")
     title: str = Field(min_length=1, max_length=200, description="what it is called")
-    about: str = Field(default="", max_length=100_000, description="a text for participants")
+    about: str = Field(default="", max_length=100_000, description="a text for participants, Markdown")
+    pages: dict[Annotated[str, Field(pattern=PHASE)], Annotated[str, Field(max_length=100_000)]] = Field(
+        default={}, description="further texts by name, Markdown, each a page of the web"
+    )
     configurations: Annotated[list[Entry], Some] = Field(
         description="files, names of shipped configurations, or {name, file} or {name, document}"
     )

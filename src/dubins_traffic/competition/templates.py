@@ -25,6 +25,16 @@ def template_files(kind: str) -> dict[str, str]:
     return {name.removesuffix(_SUFFIX): text for name, text in sorted(_texts(folder))}
 
 
+def built_in(name: str) -> bytes:
+    """Return the file that hands in a controller of this package; InputError if it has none of that name."""
+    from dubins_traffic.controllers import registry
+
+    if name not in registry.names():
+        raise InputError("no built-in controller", value=name, expected=", ".join(registry.names()))
+    lines = "from dubins_traffic.controllers import registry", "", "", "def Controller():"
+    return "\n".join([*lines, f'    return registry.load("{name}")', ""]).encode()
+
+
 def write_template(kind: str, folder: Path) -> list[Path]:
     """Write the files of a template into a new or empty folder and return their paths.
 

@@ -554,11 +554,5 @@ def _agents(agents: Agents, trials: Ints, seeds: npt.NDArray[np.uint64] | None) 
     recall = cars["recall"][nudged]
     cars["recall"][nudged] = np.arange(len(recall))
     return Agents(
-        team,
-        cars,
-        agents.cycle,
-        agents.script,
-        agents.trail[trail],
-        agents.point[trail],
-        agents.recalled[recall],
-    )
+        team, cars, agents.cycle, agents.script, agents.trail[trail], agents.point[trail], agents.recalled[recall]
+    )  # fmt: skip

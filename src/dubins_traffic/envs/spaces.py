@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import spaces
 
 from dubins_traffic.cars.state import Observation
-from dubins_traffic.envs.terms import COSTS, TERM, TERMS
+from dubins_traffic.envs.terms import COSTS, TERM, TERMS, cost_of
 from dubins_traffic.kernels.arrays import Floats
 
 if TYPE_CHECKING:
@@ -63,9 +63,11 @@ _COSTS = np.dtype([(name, np.float64) for name in COSTS])
 
 def info_of_one(terms: Floats, weighted: Floats) -> dict[str, Any]:
     """Return the info of a step of one environment, whose terms, (T,), are given without and with weights."""
+    costs = terms[TERM.BREACHES :]
     return {
         "reward_terms": dict(zip(TERMS, weighted.tolist(), strict=True)),
-        "cost": dict(zip(COSTS, terms[TERM.BREACHES :].tolist(), strict=True)),
+        "cost": float(cost_of(costs)),
+        "costs": dict(zip(COSTS, costs.tolist(), strict=True)),
     }
 
 
@@ -75,16 +77,18 @@ class StepInfo:
     def __init__(self, envs: int) -> None:
         everyone = np.ones(envs, dtype=np.bool_)
         everyone.flags.writeable = False
-        self._masks = {"_reward_terms": everyone, "_cost": everyone}
+        self._masks = {"_reward_terms": everyone, "_cost": everyone, "_costs": everyone}
 
     def of_all(self, terms: Floats, weighted: Floats) -> dict[str, Any]:
         """Return the info of a step, whose terms, (E, T), are given without and with weights.
 
-        Of `reward_terms` and `cost` each is an array (E,) of rows whose fields have the names of the terms, so that
-        ``info["cost"]["2.left"]`` is (E,).
+        `cost` is (E,). Of `reward_terms` and `costs` each is an array (E,) of rows whose fields have the names of the
+        terms, so that ``info["costs"]["2.left"]`` is (E,).
         """
+        costs = terms[:, TERM.BREACHES :].copy()
         return {
             "reward_terms": weighted.copy().view(_TERMS)[:, 0],
-            "cost": terms[:, TERM.BREACHES :].copy().view(_COSTS)[:, 0],
+            "cost": cost_of(costs),
+            "costs": costs.view(_COSTS)[:, 0],
             **self._masks,
         }

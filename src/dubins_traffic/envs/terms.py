@@ -15,11 +15,14 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.rules import breach_log
+from dubins_traffic.rules.breach_log import RULE, RULES
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
 
 COSTS: Final = (*EGO_RULES, "at_fault")
 """Costs, by number: breaches of each rule of the ego's, and its collisions at fault."""
 AT_FAULT: Final = len(COSTS) - 1
+COUNTED: Final = tuple(k for k, name in enumerate(COSTS) if name != RULES[RULE.COLLISION])
+"""The costs whose sum is the one cost of a step: a collision counts once, where the ego is at fault."""
 PARTS: Final = (*COSTS, *ASSUMPTIONS)
 """The parts that can be broken, by number: of the ego its rules and fault, of an e-agent E1 to E6."""
 
@@ -55,6 +58,11 @@ WEIGHTS: Final[Mapping[str, float]] = {
 `comfort`: sum over ticks of the squared changes of speed and yaw rate, as shares of the car's bounds; `time`, seconds;
 the ego's breaches by rule (rule 1's collisions whoever is at fault); `at_fault`: collisions in which it is at fault.
 """
+
+
+def cost_of(costs: Floats) -> Floats:
+    """Return the one cost, (...), of rows of costs, (..., C): breaches of all rules, collisions where at fault."""
+    return costs[..., COUNTED].sum(axis=-1)
 
 
 def costs_of_rules() -> Ints:
@@ -140,8 +148,8 @@ class Pay:
             costly: Floats = broken[EGO, :_FIRST].astype(np.float64)
             of_ego = np.concatenate([terms[EGO, : TERM.BREACHES], costly])
             weighted: list[float] = (of_ego * self._ego).tolist()
-            costs = dict(zip(COSTS, costly.tolist(), strict=True))
-            return sum(weighted), {"reward_terms": dict(zip(TERMS, weighted, strict=True)), "cost": costs}
+            told = {"reward_terms": dict(zip(TERMS, weighted, strict=True)), "cost": float(cost_of(costly))}
+            return sum(weighted), told | {"costs": dict(zip(COSTS, costly.tolist(), strict=True))}
         parts = dict(zip(ASSUMPTIONS, map(float, broken[car, _FIRST:]), strict=True))
         done: dict[str, float] = dict(
             zip(TERMS[: TERM.BREACHES], terms[car, : TERM.BREACHES].tolist(), strict=True)
@@ -151,4 +159,5 @@ class Pay:
             done["spoiled"] = -float(sum(terms[EGO, k] * self._ego[k] for k in task))
             done["violated"] = float(broken[EGO, :AT_FAULT].sum())
         terms_of_car = {name: weight * {**done, **parts}[name] for name, weight in self._others.items()}
-        return sum(terms_of_car.values()), {"reward_terms": terms_of_car, "cost": parts}
+        told = {"reward_terms": terms_of_car, "cost": sum(parts.values()), "costs": parts}
+        return sum(terms_of_car.values()), told

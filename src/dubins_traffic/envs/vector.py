@@ -203,7 +203,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         """Return the last observations and infos of episodes that have ended in this step."""
         flat = self.fleet.board.arrays["flat"]
         kind, layout = self.settings.observation, self.settings.layout
-        final = {**info, "_reward_terms": over.copy(), "_cost": over.copy(), **last}
+        final = {**info, "_reward_terms": over.copy(), "_cost": over.copy(), "_costs": over.copy(), **last}
         observations = self._spread(ended, "final_obs", [observed(kind, layout, flat[env]) for env in ended])
         return {**observations, "final_info": final, "_final_info": over.copy()}
 

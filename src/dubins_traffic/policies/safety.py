@@ -117,6 +117,20 @@ def keeps_clear(pose: Pose, command: Command, car: Mover, other: Box, travel: fl
     return command.yaw_rate == 0.0 and ahead + travel <= -car.half_length
 
 
+@jit_rare
+def slides_on(pose: Pose, car: Mover, other: Pose) -> bool:
+    """Tell whether all that another car may reach in a tick lies before the front of a straight rectangle.
+
+    What touches its sides or its rear meanwhile is at fault alone (docs/rules.md#at-fault). All cars are alike.
+    """
+    turn = min(car.yaw_most * car.period, 1.0)
+    far = car.half_length + max(car.fastest, -car.slowest) * car.period
+    long, broad = far + car.half_width * turn, car.half_width + far * turn
+    reach = Box(other.x, other.y, other.c, other.s, long, broad, 0.0)
+    ahead = (other.x - pose.x) * pose.c + (other.y - pose.y) * pose.s
+    return ahead + half_extent(-pose.s, pose.c, other.c, other.s, reach) + GUARD <= car.half_length
+
+
 @jit_inline
 def moved_by(command: Command, car: Mover) -> float:
     """Return how far the farthest point of a car gets in a tick, metres, at most."""

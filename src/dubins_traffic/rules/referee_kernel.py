@@ -157,14 +157,8 @@ def _judge_entry(b: int, n: int, tick: int, v: int, stopped: bool, tables: Refer
 
 @jit
 def judge_frames(
-    first: int,
-    begin: int,
-    room: int,
-    poses: State,
-    bits: Bits,
-    labelling: LabelTables,
-    judging: RefereeTables,
-) -> int:
+    first: int, begin: int, room: int, poses: State, bits: Bits, labelling: LabelTables, judging: RefereeTables
+) -> int:  # fmt: skip
     """Label and judge frames of one trial from row `begin` (row) on; return the row after the last.
 
     Row f of `poses` (F, N) is frame `first` (tick) + f. The flags found are written to `bits` (F, N). It ends early

@@ -200,20 +200,11 @@ class Verdict:
 
 
 def reach_verdict(
-    instance: Instance,
-    rules: RuleParameters,
-    breaches: Sequence[Breach],
-    collisions: tuple[Collision, ...],
-    visits: Visits,
-    visited_now: Sequence[bool],
-    was_sensed: Callable[[int, int, int], bool],
-    seen: Callable[[int, int], bool],
-    running: Pending,
-    margins: dict[str, float | None],
-    *,
-    whole: bool,
+    instance: Instance, rules: RuleParameters, breaches: Sequence[Breach], collisions: tuple[Collision, ...],
+    visits: Visits, visited_now: Sequence[bool], was_sensed: Callable[[int, int, int], bool],
+    seen: Callable[[int, int], bool], running: Pending, margins: dict[str, float | None], *, whole: bool,
     end: str | None,
-) -> Verdict:
+) -> Verdict:  # fmt: skip
     """Return the verdict on a trial.
 
     Norm: docs/rules.md#violated, docs/rules.md#excused, docs/rules.md#satisfied, docs/rules.md#unfinished.

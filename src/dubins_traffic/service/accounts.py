@@ -215,20 +215,27 @@ def _void(session: Session, which: ColumnElement[bool], at: float) -> None:
     session.execute(update(Code).where(which, Code.used.is_(None)).values(used=at))
 
 
-def remove(session: Session, account: Account, at: float) -> None:
-    """Remove a person: name, password and tokens go; the team's submissions and what it won stay.
+def leave(session: Session, account: Account, at: float) -> None:
+    """Take a person out of the team; the team's submissions and what it won stay.
 
     Nobody joins by an invitation to the team that the person may know, or that the person has made.
     """
-    known = or_(Code.account_id == account.id, Code.made_by == account.id)
+    known = Code.made_by == account.id
     if account.team_id is not None:
         known = or_(known, Code.team_id == account.team_id)
     _void(session, known, at)
+    account.team_id = None
+
+
+def remove(session: Session, account: Account, at: float) -> None:
+    """Remove a person, who leaves the team: name, password and tokens go."""
+    leave(session, account, at)
+    _void(session, Code.account_id == account.id, at)
     for token in tokens(session, account):
         token.revoked = at
         token.name = "removed"
     account.name, account.password = f"removed {account.id}", "none"
-    account.team_id, account.removed, account.role = None, at, PARTICIPANT
+    account.removed, account.role = at, PARTICIPANT
     account.epoch += 1
 
 

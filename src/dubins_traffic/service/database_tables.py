@@ -26,13 +26,17 @@ class Base(DeclarativeBase):
 
 
 class Team(Base):
-    """A team; `turn` counts the seconds of workers that it has had, by which the queue goes round the teams."""
+    """A team; `turn` counts the seconds of workers that it has had, by which the queue goes round the teams.
+
+    `baseline` says that it is a built-in controller, which is shown apart.
+    """
 
     __tablename__ = "team"
     id: Mapped[int] = mapped_column(primary_key=True)
     name: Mapped[str] = mapped_column(String(60), unique=True)
     created: Mapped[float]
     turn: Mapped[float] = mapped_column(default=0.0)
+    baseline: Mapped[bool] = mapped_column(Boolean, default=False)
     accounts: Mapped[list[Account]] = relationship(back_populates="team")
 
 
@@ -93,6 +97,17 @@ class Competition(Base):
     phases: Mapped[list[Phase]] = relationship(back_populates="competition", order_by="Phase.id")
 
 
+class Announcement(Base):
+    """What organisers tell everybody about a competition, in Markdown."""
+
+    __tablename__ = "announcement"
+    id: Mapped[int] = mapped_column(primary_key=True)
+    competition_id: Mapped[int] = mapped_column(ForeignKey("competition.id"), index=True)
+    at: Mapped[float]
+    title: Mapped[str] = mapped_column(Text)
+    text: Mapped[str] = mapped_column(Text)
+
+
 class Phase(Base):
     """A phase of a competition; `version` counts the changes of its results, of which `ranked` are in the table."""
 
@@ -118,6 +133,10 @@ class Phase(Base):
     def is_closed(self, at: float) -> bool:
         """Whether the phase is over at a time."""
         return self.closes is not None and at >= self.closes
+
+    def left(self, at: float) -> float | None:
+        """Return for how many seconds the phase is still open; None if it is not, or has no end."""
+        return self.closes - at if self.closes is not None and self.is_open(at) else None
 
 
 class Submission(Base):
@@ -154,7 +173,8 @@ class Submission(Base):
 class Chunk(Base):
     """A unit of work: the check of a submission, some of its trials, or some of them again.
 
-    `token` is the fencing token: it grows with every lease, and only the latest may report.
+    `token` is the fencing token: it grows with every lease, and only the latest may report. `took` says how many
+    seconds the lease lasted under which it was done.
     """
 
     __tablename__ = "chunk"
@@ -169,6 +189,7 @@ class Chunk(Base):
     attempts: Mapped[int] = mapped_column(default=0)
     leased_at: Mapped[float | None]
     leased_until: Mapped[float | None]
+    took: Mapped[float | None]
     worker: Mapped[str] = mapped_column(String(60), default="")
     note: Mapped[str] = mapped_column(Text, default="")
     submission: Mapped[Submission] = relationship()

@@ -10,6 +10,7 @@ import tempfile
 import tomllib
 import zipfile
 from collections.abc import Iterator, Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, cast
 
@@ -19,10 +20,18 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition import sealing
 from dubins_traffic.competition.competition import FILE, load_competition
 from dubins_traffic.competition.competition import Competition as Loaded
+from dubins_traffic.competition.templates import built_in
 from dubins_traffic.errors import DubinsTrafficError, InputError, shown
 from dubins_traffic.service import receiving, standings, submissions, viewing
-from dubins_traffic.service.accounts import WrongEntryError, note
-from dubins_traffic.service.database_tables import Account, Competition, Phase, Submission
+from dubins_traffic.service.accounts import WrongEntryError, make_team, note
+from dubins_traffic.service.database_tables import (
+    Account,
+    Announcement,
+    Competition,
+    Phase,
+    Submission,
+    Team,
+)
 from dubins_traffic.service.service import Service, competition_of
 
 SLUG = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,58}[a-z0-9])?")
@@ -53,7 +62,7 @@ def create(service: Service, slug: str, given: Mapping[str, bytes], by: Account 
     place = service.place(slug)
     place.parent.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=place.parent) as draft:
-        loaded = _written(Path(draft), given)
+        loaded = written(Path(draft), given)
         for phase in loaded.phases:
             if phase.secret:
                 sealing.seal(phase, service.needed_key())
@@ -87,7 +96,8 @@ def files_of(path: Path) -> Mapping[str, bytes]:
     return {item.name: item.read_bytes() for item in items}
 
 
-def _written(draft: Path, given: Mapping[str, bytes]) -> Loaded:
+def written(draft: Path, given: Mapping[str, bytes]) -> Loaded:
+    """Write the files of a competition into a folder and return it; InputError if something is wrong in them."""
     for name, data in given.items():
         if not PLAIN.fullmatch(name):
             raise WrongEntryError(f"files: {shown(name, 60)}: names of letters, digits, '.', '_' and '-'")
@@ -171,6 +181,52 @@ def close_phase(service: Service, session: Session, phase: Phase, by: Account) -
     note(session, by, "close", _name(phase), "", at)
 
 
+def reopen_phase(service: Service, session: Session, phase: Phase, by: Account, until: str) -> None:
+    """Open a phase that is over until another time; RefusedError if it is not over, or its seeds are revealed."""
+    at, closes = service.clock(), _later(until)
+    if not phase.is_closed(at):
+        raise submissions.RefusedError("the phase is not over")
+    if phase.revealed is not None:
+        raise submissions.RefusedError("its seeds are revealed")
+    if closes <= at:
+        raise WrongEntryError("until: in the past; a time to come, UTC")
+    phase.closes, phase.podium_checked = closes, False
+    phase.version += 1
+    note(session, by, "re-open", _name(phase), f"until {until}", at)
+
+
+def _later(text: str) -> float:
+    try:
+        time = datetime.fromisoformat(text.strip())
+        if time.utcoffset():
+            raise ValueError
+        return time.replace(tzinfo=UTC).timestamp()
+    except ValueError:
+        raise WrongEntryError(f"until: {shown(text, 40)}: a time in UTC, as 2027-03-01T12:00:00Z") from None
+
+
+def announce(
+    service: Service, session: Session, row: Competition, by: Account, title: str, text: str
+) -> None:
+    """Tell everybody something, in Markdown, on the page of a competition and in its feed."""
+    if not 1 <= len(title.strip()) <= 200 or not text.strip():
+        raise WrongEntryError("announcement: a title of 1 to 200 letters, and a text")
+    at = service.clock()
+    session.add(Announcement(competition_id=row.id, at=at, title=title.strip(), text=text))
+    note(session, by, "announce", row.slug, title.strip(), at)
+
+
+def retract(service: Service, session: Session, number: int, by: Account) -> str:
+    """Take an announcement back, and return the address of its competition; WrongEntryError if there is none."""
+    row = session.get(Announcement, number) if number < 1 << 31 else None
+    if row is None:
+        raise WrongEntryError("no such announcement")
+    session.delete(row)
+    slug = session.get_one(Competition, row.competition_id).slug
+    note(session, by, "retract", slug, row.title, service.clock())
+    return slug
+
+
 def reveal(service: Service, session: Session, phase: Phase, by: Account) -> None:
     """Reveal the secret seeds of a phase that has closed and whose submissions have all ended.
 
@@ -206,6 +262,27 @@ def disqualify(service: Service, session: Session, submission: Submission, by: A
     note(session, by, act, f"submission {submission.id}", submission.disqualified, service.clock())
 
 
+def add_baseline(service: Service, session: Session, phase: Phase, by: Account, controller: str) -> None:
+    """Hand in a built-in controller, which is shown apart from the teams; it counts for no quota.
+
+    RefusedError if the phase is over, or the controller has been handed in.
+    """
+    at, data, name = service.clock(), built_in(controller), f"built-in {controller}"
+    if phase.is_closed(at):
+        raise submissions.RefusedError("the phase is over")
+    team = session.scalars(select(Team).where(Team.name == name, Team.baseline)).first()
+    if team is None:
+        team = make_team(session, name, at)
+        team.baseline = True
+    upload = submissions.Upload(service.storage.put(data, "submissions"), "controller.py", len(data))
+    known = select(Submission.id).where(Submission.phase_id == phase.id, Submission.team_id == team.id)
+    if session.scalars(known).first() is not None:
+        raise submissions.RefusedError(f"{controller} has been handed in")
+    made = Submission(phase_id=phase.id, team_id=team.id, digest=upload.digest, size=upload.size, run=0)
+    submissions.begin(session, made, by, upload, at)
+    note(session, by, "baseline", _name(phase), controller, at)
+
+
 def _name(phase: Phase) -> str:
     return f"{phase.competition.slug}/{phase.name}"
 
@@ -215,7 +292,7 @@ EPOCH = (1980, 1, 1, 0, 0, 0)
 README = """\
 A competition of dubins-traffic, exported.
 
-  competition.toml, *.json    the competition as it was run
+  competition.toml, *.json    the competition as its file was given last
   published/                  commitments to secret seeds, and the seeds where they are revealed
   submissions/DIGEST          what teams have sent
   PHASE/submissions.json      all submissions of a phase, and which of them counted

@@ -122,6 +122,7 @@ def held(session: Session, chunk_id: int, token: int) -> Chunk:
 
 def finish(session: Session, chunk: Chunk, at: float) -> None:
     """End a lease with its work done."""
+    chunk.took = None if chunk.leased_at is None else max(0.0, at - chunk.leased_at)
     _charge(session, chunk, at)
     chunk.state, chunk.leased_until, chunk.note = "done", None, ""
     session.flush()

@@ -127,17 +127,17 @@ class Service:
         self.cookie_secret = secret_in(folder, "cookies.key")
         self.key_file = key_file
         self._read_key = None if key_file is None else _key(key_file, folder)
-        self._competitions: dict[int, files.Competition] = {}
+        self._competitions: dict[int, tuple[str, files.Competition]] = {}
         self._seeds: dict[tuple[int, str], tuple[int, ...]] = {}
         self._hidings: dict[int, Hiding] = {}
 
     def competition(self, row: Competition) -> files.Competition:
         """Return a competition as its file says it."""
-        loaded = self._competitions.get(row.id)
-        if loaded is None:
+        document, loaded = self._competitions.get(row.id, ("", None))
+        if loaded is None or document != row.document:
             place = self.place(row.slug)
             loaded = files.Competition.from_document(json.loads(row.document), row.slug, place)
-            self._competitions[row.id] = loaded
+            self._competitions[row.id] = row.document, loaded
         return loaded
 
     def place(self, slug: str) -> Path:

@@ -16,10 +16,12 @@ import uvicorn
 from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session
 
+from dubins_traffic.competition.competition import load_competition
+from dubins_traffic.errors import InputError
 from dubins_traffic.live.listening import address_of
-from dubins_traffic.service import accounts, organising
+from dubins_traffic.service import accounts, editing, organising
 from dubins_traffic.service.client import TOKEN
-from dubins_traffic.service.database_tables import Account, Code, Token
+from dubins_traffic.service.database_tables import Account, Code, Competition, Token
 from dubins_traffic.service.housekeeping import Housekeeper
 from dubins_traffic.service.service import Service, competition_of
 from dubins_traffic.service.web.app import create_app
@@ -43,12 +45,19 @@ def prepare(service: Service, competitions: list[Path], url: str) -> str | None:
         If a competition can't be made.
     """
     service.database.migrate()
+    given = {organising.slug_of(path) for path in competitions}
+    with service.database.reading() as session:
+        kept = [slug for slug in session.scalars(select(Competition.slug)) if slug not in given]
+    for slug in kept:
+        _say_changes(service, slug, service.place(slug))
     for path in competitions:
         slug = organising.slug_of(path)
         with service.database.reading() as session:
             known = competition_of(session, slug)
         if known is None:
             organising.create(service, slug, organising.files_of(path), None)
+        else:
+            _say_changes(service, slug, path)
     with service.database.writing() as session:
         organisers = select(func.count()).where(Account.role == accounts.ORGANISER, Account.removed.is_(None))
         if session.scalar(organisers):
@@ -57,6 +66,25 @@ def prepare(service: Service, competitions: list[Path], url: str) -> str | None:
         session.execute(unused.values(used=service.clock()))
         code = accounts.invite(session, accounts.ORGANISER, None, service.clock())
     return f"{service.settings.url.rstrip('/') or url}/join?code={code}"
+
+
+def _say_changes(service: Service, slug: str, path: Path) -> None:
+    """Say in what the file of a competition that has begun differs from it: the file alone changes nothing."""
+    try:
+        loaded = load_competition(path)
+    except InputError as error:
+        log.error(
+            "the file of a competition that has begun can't be read", competition=slug, error=str(error)
+        )
+        return
+    with service.database.reading() as session:
+        row = competition_of(session, slug)
+        found = [] if row is None else editing.changes(service, row, loaded)
+    for change in found:
+        advice = "locked" if change.locked else f"to change it: /desk/edit/{slug}"
+        log.warning(
+            "the file differs from the competition", competition=slug, difference=str(change), advice=advice
+        )
 
 
 def local_token(service: Service) -> str:

@@ -22,6 +22,8 @@ log = structlog.get_logger("dubins_traffic.service")
 ANSWERS_A_DAY = 24
 """So often a day at most a table of rounded aggregates is made anew."""
 DAY = 86400.0
+PAGE = 20
+"""Tables on a page of the history."""
 
 
 def judged(trials: Sequence[Trial], *, logs: bool = False) -> list[Judged]:
@@ -99,17 +101,27 @@ def _may_answer(session: Session, phase: Phase, at: float) -> bool:
 
 
 def table(session: Session, row: Phase, phase: Loaded, hiding: Hiding) -> list[dict[str, Any]]:
-    """Return the places of a phase as JSON objects, each with its team and submission; incomplete ones are left out."""
-    entries: dict[str, list[Judged]] = {}
+    """Return the places of a phase as JSON objects, each with its team and submission; incomplete ones are left out.
+
+    Built-in controllers follow, best first: they have no place, and no team's place depends on them.
+    """
+    entries: dict[bool, dict[str, list[Judged]]] = {False: {}, True: {}}
     whose: dict[str, Submission] = {}
     for team_id, submission in counting(session, row).items():
         results = judged(submissions.trials(session, submission, hiding))
         if not missing(results, phase):
-            name = session.get_one(Team, team_id).name
-            entries[name], whose[name] = results, submission
+            team = session.get_one(Team, team_id)
+            entries[team.baseline][team.name], whose[team.name] = results, submission
+    apart: dict[str, Any] = {"place": None, "ties": [], "to_next": None, "to_next_interval": None}
     return [
-        {**place.to_json(), "team": whose[place.entry].team_id, "submission": whose[place.entry].id}
-        for place in rank(entries, phase)
+        {
+            **place.to_json(),
+            **(apart if baseline else {}),
+            "team": whose[place.entry].team_id,
+            "submission": whose[place.entry].id,
+        }
+        for baseline in (False, True)
+        for place in rank(entries[baseline], phase)
     ]
 
 
@@ -120,18 +132,18 @@ def latest_standing(session: Session, phase: Phase, hiding: Hiding) -> Standing 
     return None if standing is None else hiding.shown(standing)
 
 
-def history(session: Session, phase: Phase, hiding: Hiding) -> Sequence[Standing]:
-    """Return all tables of a phase, oldest first."""
-    query = select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id)
-    return [hiding.shown(one) for one in session.scalars(query)]
+def history(session: Session, phase: Phase, hiding: Hiding, page: int) -> tuple[list[Standing], bool]:
+    """Return a page of the tables of a phase before the latest, newest first, and whether older ones follow."""
+    query = select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id.desc())
+    found = session.scalars(query.offset(1 + page * PAGE).limit(PAGE + 1)).all()
+    return [hiding.shown(one) for one in found[:PAGE]], len(found) > PAGE
 
 
 def first_entries(session: Session, phase: Phase, count: int, hiding: Hiding) -> list[int]:
     """Return the numbers of the submissions on the first places."""
     latest = latest_standing(session, phase, hiding)
-    return (
-        [] if latest is None else [place["submission"] for place in latest.places if place["place"] <= count]
-    )
+    places = [] if latest is None else latest.places
+    return [place["submission"] for place in places if place["place"] and place["place"] <= count]
 
 
 def shown_table(phase: Loaded, standing: Standing | None) -> list[dict[str, Any]]:

@@ -85,14 +85,19 @@ def receive(
         known.run = 0
     else:
         known.run += 1
-    known.account_id, known.filename, known.received = account.id, shown(upload.filename, 100), at
-    known.costs = True
-    enter(known, "received", at)
-    session.add(known)
-    session.flush()
-    queue.arrive(session, known.team_id, at)
-    queue.add(session, known, "check", [[]])
+    begin(session, known, account, upload, at)
     return known, True
+
+
+def begin(session: Session, submission: Submission, account: Account, upload: Upload, at: float) -> None:
+    """Queue the check of a submission that is taken in."""
+    submission.account_id, submission.filename = account.id, shown(upload.filename, 100)
+    submission.received, submission.costs = at, True
+    enter(submission, "received", at)
+    session.add(submission)
+    session.flush()
+    queue.arrive(session, submission.team_id, at)
+    queue.add(session, submission, "check", [[]])
 
 
 def admitted(

@@ -9,13 +9,16 @@ from typing import Any
 from sqlalchemy import func, select
 from sqlalchemy.orm import Session
 
+from dubins_traffic.competition.ranking import value
 from dubins_traffic.competition.visibility import SubmissionState, visible
 from dubins_traffic.service import standings, submissions
 from dubins_traffic.service.database_tables import (
     Account,
+    Announcement,
     Chunk,
     Competition,
     Phase,
+    Standing,
     Submission,
     Trial,
     Worker,
@@ -67,6 +70,43 @@ def replay_of(trial: Trial, submission: Submission, account: Account | None) -> 
     return (owns(account, submission) and trial.own_replay) or trial.replay
 
 
+def news(session: Session, row: Competition) -> list[Announcement]:
+    """Return the announcements of a competition, newest first."""
+    of_it = select(Announcement).where(Announcement.competition_id == row.id)
+    return list(session.scalars(of_it.order_by(Announcement.id.desc())))
+
+
+def latest_places(
+    service: Service, session: Session, row: Phase, account: Account | None
+) -> tuple[float | None, list[dict[str, Any]]]:
+    """Return when the latest table of a phase was made, and its places as somebody may see them now."""
+    if not sees_table(row, account, service.clock()) or service.waits_for_key(row):
+        return None, []
+    latest = standings.latest_standing(session, row, service.hiding(row))
+    return latest and latest.at, places_in(service, row, latest, account)
+
+
+def past_places(
+    service: Service, session: Session, row: Phase, account: Account | None, page: int
+) -> tuple[list[tuple[float, list[dict[str, Any]]]], bool]:
+    """Return a page of the tables before the latest as somebody may see them, and whether older ones follow."""
+    if not sees_table(row, account, service.clock()):
+        return [], False
+    past, older = standings.history(session, row, service.hiding(row), page)
+    return [(one.at, places_in(service, row, one, account)) for one in past], older
+
+
+def places_in(
+    service: Service, row: Phase, standing: Standing | None, account: Account | None
+) -> list[dict[str, Any]]:
+    """Return a table of a phase as somebody may see it now: whole, rounded, or nothing of it."""
+    at = service.clock()
+    if standing is None or not sees_table(row, account, at):
+        return []
+    whole = is_organiser(account) or row.is_closed(at)
+    return list(standing.places) if whole else standings.shown_table(service.phase(row), standing)
+
+
 def competition_document(service: Service, row: Competition) -> dict[str, Any]:
     """Return a competition for everybody."""
     at, loaded = service.clock(), service.competition(row)
@@ -74,6 +114,7 @@ def competition_document(service: Service, row: Competition) -> dict[str, Any]:
         "address": row.slug,
         "title": row.title,
         "about": loaded.model.about,
+        "pages": loaded.model.pages,
         "phases": [phase_document(service, phase, at) for phase in row.phases],
     }
 
@@ -117,7 +158,9 @@ def submission_document(
         iso(submission.received),
         place,
     )
-    trials = submissions.trials(session, submission, service.hiding(row), logs=logs)
+    trials: Sequence[Trial] = ()
+    if not service.waits_for_key(row):
+        trials = submissions.trials(session, submission, service.hiding(row), logs=logs)
     results = standings.judged(trials, logs=logs)
     now = datetime.fromtimestamp(service.clock(), UTC)
     phase = service.phase(row)
@@ -155,6 +198,14 @@ def trial_of(service: Service, session: Session, submission: Submission, number:
     )
     trial = session.scalars(query).first()
     return None if trial is None else service.hiding(submission.phase).shown(trial, logs=True)
+
+
+def extremes(service: Service, session: Session, submission: Submission) -> dict[str, Trial]:
+    """Return the trials of a submission with a replay that count the most and the least, as ``best`` and ``worst``."""
+    metric = service.phase(submission.phase).ranking.metric
+    its_trials = submissions.trials(session, submission, service.hiding(submission.phase))
+    ranked = sorted((one for one in its_trials if one.replay), key=lambda trial: value(trial.row, metric))
+    return {"best": ranked[-1], "worst": ranked[0]} if ranked else {}
 
 
 def status_document(service: Service, session: Session) -> dict[str, Any]:

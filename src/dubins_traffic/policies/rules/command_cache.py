@@ -163,18 +163,9 @@ def forget_command(b: int, n: int, drivers: Drivers) -> None:
 
 @jit_inline
 def drive_freely(
-    b: int,
-    n: int,
-    part: int,
-    left: float,
-    px: float,
-    py: float,
-    outside: bool,
-    chooses: bool,
-    way: ReferencePath,
-    traffic: Traffic,
-    commands: Floats,
-) -> bool:
+    b: int, n: int, part: int, left: float, px: float, py: float, outside: bool, chooses: bool, way: ReferencePath,
+    traffic: Traffic, commands: Floats,
+) -> bool:  # fmt: skip
     """Write and cache the command of a car if it has nothing to mind but its line; tell whether that is so.
 
     It is for cars of which `policy.just_drives` holds and around which nothing matters. Such a car may also wait at a
@@ -225,17 +216,9 @@ def has_more_to_mind(bits: np.int64, car: Driver) -> bool:
 
 @jit_inline
 def cache_command(
-    b: int,
-    n: int,
-    speed: float,
-    part: int,
-    outside: bool,
-    gated: bool,
-    x: float,
-    y: float,
-    way: ReferencePath,
+    b: int, n: int, speed: float, part: int, outside: bool, gated: bool, x: float, y: float, way: ReferencePath,
     traffic: Traffic,
-) -> None:
+) -> None:  # fmt: skip
     """Cache the command of a car that has nothing around it, with the stretch of its way on which it is valid.
 
     The stretch ends before the line at which the car may have to stop; an e-agent stops earlier behind the ego. For a

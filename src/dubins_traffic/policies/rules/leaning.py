@@ -6,22 +6,19 @@ the middle of its lane and one that stands at the centre line, yet the lane is f
 
 from __future__ import annotations
 
-import numpy as np
-
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
-from dubins_traffic.policies.rules.seeing import SIDE, is_by_disc_behind, way_to_go
+from dubins_traffic.policies.rules.seeing import is_by_disc_behind, kept_beside, way_to_go
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_lane, on_way
 from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import lane_end, lane_start
-from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import half_across
 
 BESIDE_LINE = 1.5
-"""So near to the disc at the end of its lane, metres, a car leans only past an ego that stands beside the line. Farther
-back it leans past whoever is beside it, and has room to turn straight again."""
+"""So near to the disc at the end of its lane, metres, a car leans past an ego alone. Farther back it leans past whoever
+is beside it, and has room to turn straight again."""
 EARLY = 0.8
 """A car leans from this gap to a body on, metres: beside it a rectangle would have no room to turn."""
 
@@ -41,8 +38,17 @@ def lean(b: int, n: int, offset: float, part: int, way: ReferencePath, near: int
     """
     drivers = traffic.drivers
     free = near == 0 or offset != 0.0 or drivers.car[b, n].aside != 0.0
-    free = free or not leans(drivers.vehicle[b]) or not may_lean(b, n, way, traffic)
+    free = free or not (leans(drivers.vehicle[b]) or is_by_ego(b, n, traffic))
+    free = free or not may_lean(b, n, way, traffic)
     return 0.0 if free else away_from(b, n, part, way, near, traffic)
+
+
+@jit_inline
+def is_by_ego(b: int, n: int, traffic: Traffic) -> bool:
+    """Tell whether the ego is near an e-agent and in a disc, where no centre line keeps it from reaching far over."""
+    state, far = traffic.state, 2.0 * traffic.drivers.vehicle[b].reach + EARLY
+    dx, dy = state.x[b, EGO] - state.x[b, n], state.y[b, EGO] - state.y[b, n]
+    return n != EGO and traffic.labels.lane[b, EGO] < 0 and dx * dx + dy * dy <= far * far
 
 
 @jit_rare
@@ -50,7 +56,7 @@ def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a car may turn aside where it is: in bends and on roads, and in and near crossings past the ego.
 
     Near the crossing out of which it comes a car may enter that anew, and a rectangle that is tilted at a line may find
-    no room to turn. So it leans there past an ego that stands, and not past other e-agents, which drive on.
+    no room to turn. So it leans there past the ego, and not past other e-agents, which drive on.
     """
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     vehicle, net = drivers.vehicle[b], drivers.net[b]
@@ -59,21 +65,15 @@ def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
     if disc >= 0 and int(roads.degree[first + disc]) < vehicle.degree:
         return True
     if lane < 0:
-        return disc >= 0 and ego_stands_beside(b, drivers.car[b, n].lane, traffic)
+        beside = int(labels.lane[b, EGO]) ^ 1
+        return disc >= 0 and beside in (drivers.car[b, n].lane, drivers.car[b, n].next_lane)
     v = lane_end(roads, net, lane)
     begin, end = int(roads.degree[first + lane_start(roads, net, lane)]), int(roads.degree[first + v])
     near = way_to_go(way, traffic.state.x[b, n], traffic.state.y[b, n]) > -(vehicle.disc + BESIDE_LINE)
     left_disc = begin < vehicle.degree or not is_by_disc_behind(b, n, way, traffic)
     if disc < 0 and left_disc and (end < vehicle.degree or not near):
         return True
-    return (near or not left_disc) and ego_stands_beside(b, lane, traffic)
-
-
-@jit_rare
-def ego_stands_beside(b: int, lane: int, traffic: Traffic) -> bool:
-    """Tell whether the ego stands on the road of a lane, with the other lane state."""
-    labels = traffic.labels
-    return labels.lane[b, EGO] == lane ^ 1 and np.int64(labels.bits[b, EGO]) & FLAG.STANDS != 0
+    return (near or not left_disc) and labels.lane[b, EGO] == lane ^ 1
 
 
 @jit_rare
@@ -84,7 +84,7 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
     centre stays on the road. `near` (count) cars are listed.
     """
     state, scratch, vehicle = traffic.state, traffic.scratch, traffic.drivers.vehicle[b]
-    clear = vehicle.half_width + vehicle.rounding + travel_of(vehicle) + GUARD + SIDE
+    clear = kept_beside(vehicle)
     far = 2.0 * vehicle.reach + EARLY
     offset = 0.0
     for k in range(near):
@@ -99,5 +99,9 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
             _, _, left, px, py = on_way(way, state.x[b, j], state.y[b, j])
         half = half_across(b, j, px, py, state, vehicle)
         if vehicle.middle < left < 4.0 * vehicle.middle:
-            offset = min(offset, left - half - clear)
+            edge = left - half
+            # While they pass each other who is beside it may come as far over the line as it may at all.
+            if leans(vehicle):
+                edge = min(edge, vehicle.middle - vehicle.over)
+            offset = min(offset, edge - clear)
     return max(offset, EDGE - vehicle.middle)

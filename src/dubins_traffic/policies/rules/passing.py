@@ -299,14 +299,8 @@ def extent(
 
 @jit
 def stands_beside(
-    b: int,
-    own: float,
-    back: float,
-    offset: float,
-    way: ReferencePath,
-    obstacles: ObstacleTable,
-    vehicle: Vehicle,
-) -> bool:
+    b: int, own: float, back: float, offset: float, way: ReferencePath, obstacles: ObstacleTable, vehicle: Vehicle
+) -> bool:  # fmt: skip
     """Tell whether an obstacle is in the way of a car that drives `offset` left of the middle of its lane to `back`."""
     wide = vehicle.half_width + vehicle.rounding + BESIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):

@@ -31,19 +31,8 @@ def _is_of(lane: int, out: int, row: KeptPath) -> bool:
 def kept_way(row: KeptPath) -> ReferencePath:
     """Return the way that a row of `Drivers.way` holds."""
     return ReferencePath(
-        row.x,
-        row.y,
-        row.tx,
-        row.ty,
-        row.ux,
-        row.uy,
-        row.cx,
-        row.cy,
-        row.radius,
-        row.side,
-        row.middle,
-        row.bend,
-    )
+        row.x, row.y, row.tx, row.ty, row.ux, row.uy, row.cx, row.cy, row.radius, row.side, row.middle, row.bend
+    )  # fmt: skip
 
 
 @jit

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from dubins_traffic.cars.near import FEW
-from dubins_traffic.cars.state import Labels, Pose
+from dubins_traffic.cars.state import EGO, Labels, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.choice import STUCK, find_way_out, keeps_exit
@@ -184,21 +184,10 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     if not close and follows_line(b, n, left - offset, traffic):
         follow_line(b, n, speed, left - offset, px, py, bend, traffic, commands)
         return
+    listed, trusted = near if close else 0, who if rides else -1
     speed, yaw_rate = move(
-        b,
-        n,
-        speed,
-        left,
-        offset,
-        px,
-        py,
-        bend,
-        outside,
-        way,
-        near if close else 0,
-        who if rides else -1,
-        traffic,
-    )
+        b, n, speed, left, offset, px, py, bend, outside, way, listed, trusted, traffic
+    )  # fmt: skip
     checked = car.kind == KIND.ROUND and company != COMPANY.UNROLLED
     if speed != 0.0 and checked and strays(b, n, speed, yaw_rate, way, traffic):
         speed = 0.0
@@ -264,7 +253,9 @@ def pass_what_stands(
     if outside and (bits & FLAG.BLOCKED != 0 or car.aside != 0.0):
         watch(b, n, who, traffic)
     offset = 2.0 * vehicle.middle if car.violations & VIOLATION.LEFT_SIDE != 0 and outside else 0.0
-    stubborn = part == PART.THROUGH or who < 0 or bits & FLAG.BLOCKED != 0 or offset != 0.0
+    # An ego that stands at the edge of the lane may leave room to pass it there, and does not excuse who waits (E5).
+    narrows = bits & FLAG.BLOCKED != 0 or (who == EGO and labels.bits[b, EGO] & FLAG.STANDS != 0)
+    stubborn = part == PART.THROUGH or who < 0 or narrows or offset != 0.0
     car.waited = car.waited + 1 if stubborn and gap < kept + 0.05 else 0
     if offset != 0.0 and car.waited > ticks_of(STUCK, vehicle):
         car.violations &= ~VIOLATION.LEFT_SIDE
@@ -280,7 +271,7 @@ def pass_what_stands(
     elif car.aside != 0.0:
         speed = keep_passing(b, n, speed, way, near, traffic)
         offset = car.aside if way_to_go(way, state.x[b, n], state.y[b, n]) < car.until else 0.0
-    elif (bits & FLAG.BLOCKED != 0 or who < -1) and waited_long(car, bits, vehicle):
+    elif (narrows or who < -1) and waited_long(car, bits, vehicle):
         find_way_past(b, n, way, who, traffic)
     return speed, offset
 

@@ -9,7 +9,7 @@ from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.narrow import offset_in_lane
-from dubins_traffic.policies.rules.seeing import BEYOND, FACING_GAP, QUEUE_GAP, SIDE
+from dubins_traffic.policies.rules.seeing import BEYOND, BRISK, FACING_GAP, QUEUE_GAP, SIDE
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_direction, lane_end, lane_start
 from dubins_traffic.rules.exits import LaneOut, takes_lane
@@ -18,8 +18,6 @@ from dubins_traffic.rules.tables import GRAIN
 
 MARGIN = 0.02
 """Distance that a car keeps from a disc that it may not enter, metres."""
-BRISK = 0.3
-"""A car that leaves the crossing at least at this speed counts as making room, m/s."""
 OVER = 0.05
 """A car less than this beyond the centre line of a lane still counts as in it, metres, unless it is on the other lane
 and not left: then it passes an obstacle within its own lane, or sways."""

@@ -6,14 +6,16 @@ from math import sqrt
 
 import numpy as np
 
-from dubins_traffic.cars.state import Labels, State
+from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import ObstacleTable
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Scratch, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_way
+from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.rules.shape import half_across
 
 QUEUE_GAP = 0.12
 """Gap kept behind a car that waits, metres."""
@@ -26,6 +28,9 @@ the largest distance between centres, at which it still counts as blocking the l
 FACING_GAP, BEYOND = 0.8, 0.02
 """Gap kept from an oncoming car, metres, by an ego even this much more if that car is left: nearer by it would count as
 what keeps the car from going back (E5); a car on the left has to return, and goes closer."""
+BRISK = 0.3
+"""A car that leaves the crossing at least at this speed counts as making room, m/s; one that comes more slowly makes
+nobody wait in a disc for it."""
 OBSTACLE_GAP = 0.04
 """Gap kept in a disc from an obstacle behind the disc, metres: it never moves, and a car near it may then pass it."""
 CLOSE_GAP = 0.06
@@ -37,6 +42,9 @@ BACKWARD = -0.9
 HALF_TURN = 3.1
 """Length of the arc in which a car turns round, in units of its radius."""
 HELD = 1e9
+ABRUPT, ASTRAY = 0.8, 0.18
+"""Sine of the angle at which a car returns to its way that is astray in a disc, having chosen another exit late, and
+how far left of it such a car is, metres."""
 AWARE = 0.06
 """A car takes note of bodies up to this much farther away than the gap it keeps, metres."""
 
@@ -149,8 +157,14 @@ def look_ahead(
             continue
         if d2 < touch * touch:
             close = True
-        there, its_key, its_left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
-        if there < part or (there == part and its_key <= key) or its_left < low or its_left > high:
+        there, its_key, its_left, px, py = on_way(way, state.x[b, j], state.y[b, j])
+        if there < part or (there == part and its_key <= key) or its_left > high:
+            continue
+        if its_left < low and (j != EGO or its_left < low - wider(b, px, py, state, vehicle)):
+            continue
+        if left > ASTRAY and its_left > wide and comes_past(way, x, y, dx, dy, wide):
+            continue
+        if j == EGO and n != EGO and leans_past(b, its_left, px, py, car, traffic):
             continue
         passed = car.aside > 0.0 and labels.bits[b, j] & FLAG.STANDS != 0
         if passed and its_left < car.aside - wide + SIDE:
@@ -165,6 +179,45 @@ def look_ahead(
             gap = its_gap
             who = j
     return see_obstacles(b, part, key, x, y, way, low, high, gap, who, close, obstacles, vehicle, car)
+
+
+@jit_rare
+def wider(b: int, px: float, py: float, state: State, vehicle: Vehicle) -> float:
+    """Return how much farther across a way with the direction (`px`, `py`) the ego reaches than along it, metres."""
+    return half_across(b, EGO, px, py, state, vehicle) - vehicle.half_width - vehicle.rounding
+
+
+@jit_rare
+def comes_past(way: ReferencePath, x: float, y: float, dx: float, dy: float, wide: float) -> bool:
+    """Tell whether a car at `x` (m), `y` (m), astray left of its way, comes back to it straight past a body beside it.
+
+    The body's centre is `dx` (m) and `dy` (m) from the car's; past means at least `wide` (m) beside, or behind.
+    """
+    _, _, _, px, py = on_way(way, x, y)
+    cosine = sqrt(1.0 - ABRUPT * ABRUPT)
+    hx, hy = px * cosine + py * ABRUPT, py * cosine - px * ABRUPT
+    return dx * hx + dy * hy <= 0.0 or abs(dx * hy - dy * hx) >= wide
+
+
+@jit_rare
+def leans_past(b: int, left: float, px: float, py: float, car: Driver, traffic: Traffic) -> bool:
+    """Tell whether an e-agent gets past an ego in a disc, `left` (m) of the middle of its way, by leaning, as it will.
+
+    The way has the direction (`px`, `py`) there.
+    """
+    vehicle = traffic.drivers.vehicle[b]
+    if left <= vehicle.middle or car.aside != 0.0 or traffic.labels.lane[b, EGO] >= 0:
+        return False
+    return (
+        left - half_across(b, EGO, px, py, traffic.state, vehicle) - kept_beside(vehicle)
+        >= EDGE - vehicle.middle
+    )
+
+
+@jit_inline
+def kept_beside(vehicle: Vehicle) -> float:
+    """Return how far a car that leans keeps its centre from a body beside it, metres."""
+    return vehicle.half_width + vehicle.rounding + travel_of(vehicle) + GUARD + SIDE
 
 
 @jit_inline
@@ -259,7 +312,8 @@ def wanted_gap(
     its = np.int64(labels.bits[b, who])
     _, _, _, px, py = on_way(way, state.x[b, who], state.y[b, who])
     along = state.c[b, who] * px + state.s[b, who] * py
-    stands_facing = labels.crosses[b, n] >= 0 and abs(state.speed[b, who]) < 0.05
+    ahead = labels.lane[b, who] == car.next_lane or labels.lane[b, who] == car.lane
+    stands_facing = labels.crosses[b, n] >= 0 and (abs(state.speed[b, who]) < BRISK or ahead)
     if along < -0.3 and labels.crosses[b, who] < 0 and not stands_facing:
         return FACING_GAP if labels.bits[b, n] & FLAG.LEFT == 0 else MOVING_GAP
     in_disc = labels.crosses[b, n] >= 0

@@ -13,19 +13,17 @@ from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import along
 from dubins_traffic.policies.rules.returning import NARROWLY, last_return
+from dubins_traffic.policies.rules.seeing import ABRUPT, ASTRAY
 from dubins_traffic.policies.rules.standing import may_drive_on, stays_right
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
-from dubins_traffic.policies.safety import may_hit, may_meet, travel_of
+from dubins_traffic.policies.safety import may_hit, may_meet, slides_on, travel_of
 from dubins_traffic.rules.propositions import FLAG
 
 HURRY, WIDE = 0.25, 0.4
 """Distance in which a car returns to its way: the greater of metres and units of its turning radius."""
-SLANT, STEEP, ABRUPT = 0.7, 0.9, 0.8
-"""Sine of the largest angle to its way at which a car drives: in general; when it pulls out or has to return; and when
-it is astray in a disc, having chosen another exit late."""
-ASTRAY = 0.18
-"""A car this far left of its way in a disc is astray, metres."""
+SLANT, STEEP = 0.7, 0.9
+"""Sine of the largest angle to its way at which a car drives: in general; and when it pulls out or has to return."""
 ALIGNED, NIMBLE = 0.8, 0.98
 """Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
 CREEPS, SLIDES = 0.05, 0.2
@@ -98,7 +96,25 @@ def move(
         speed = 0.0
         if vehicle.half_length > 0.0 and not is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle):
             yaw_rate = 0.0
+            if n != EGO and c * px + s * py > ALIGNED and goes_on(b, n, allowed, outside, way, near, traffic):
+                speed = allowed
     return speed, yaw_rate
+
+
+@jit_rare
+def goes_on(
+    b: int, n: int, speed: float, outside: bool, way: ReferencePath, near: int, traffic: Traffic
+) -> bool:
+    """Tell whether an e-agent beside which another car is as close as may be can drive straight on past it."""
+    state, vehicle, scratch = traffic.state, traffic.drivers.vehicle[b], traffic.scratch
+    pose, beside = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]), 0
+    for k in range(near):
+        j = scratch.near[k]
+        if not slides_on(pose, vehicle, Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])):
+            scratch.near[beside] = j
+            beside += 1
+    on = is_safe_from(pose, b, Command(speed, 0.0), beside, -1, traffic, vehicle)
+    return on and (not outside or stays_right(b, n, speed, 0.0, way, traffic))
 
 
 @jit_rare

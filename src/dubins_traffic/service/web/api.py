@@ -12,7 +12,7 @@ from litestar.params import MultipartBody, PathParameter
 from prometheus_client import CollectorRegistry, Gauge, generate_latest
 from sqlalchemy import func, select
 
-from dubins_traffic.service import queue, receiving, standings, viewing
+from dubins_traffic.service import queue, receiving, viewing
 from dubins_traffic.service.database_tables import Competition, Submission
 from dubins_traffic.service.service import Service
 from dubins_traffic.service.web import requests
@@ -63,15 +63,9 @@ class Api(Controller):
     @get("/competitions/{slug:str}/phases/{name:str}/table", sync_to_thread=True)
     def table(self, service: ServiceHere, viewer: ViewerHere, slug: Name, name: Name) -> list[dict[str, Any]]:
         """Return the table of a phase, as far as it may be seen."""
-        at = service.clock()
         with service.database.reading() as session:
             row = receiving.phase_named(session, slug, name)
-            if not viewing.sees_table(row, viewer.account, at):
-                return []
-            latest = standings.latest_standing(session, row, service.hiding(row))
-            if viewer.organiser or row.is_closed(at):
-                return [] if latest is None else list(latest.places)
-            return standings.shown_table(service.phase(row), latest)
+            return viewing.latest_places(service, session, row, viewer.account)[1]
 
     @get("/account", sync_to_thread=True, guards=[requests.person])
     def account(self, viewer: ViewerHere) -> dict[str, Any]:

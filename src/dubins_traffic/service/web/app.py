@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any
 
 import structlog
-from jinja2 import Undefined
 from litestar import Litestar, MediaType, Request, Response
 from litestar.config.csrf import CSRFConfig
 from litestar.connection import ASGIConnection
@@ -39,10 +38,10 @@ from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import NoKeyError, Service, ServiceSettings
 from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
+from dubins_traffic.service.texts import templates
 from dubins_traffic.service.web import api, organisers, pages, worker_api
-from dubins_traffic.service.web.pages import TEMPLATES, moment
+from dubins_traffic.service.web.pages import TEMPLATES
 from dubins_traffic.service.web.requests import PROGRAMS, Bodies, Recognition, Viewer
-from dubins_traffic.viewer.pages import environment
 
 LOADED = "loaded_session"
 """Where the state of a request holds what its session was when it came."""
@@ -144,7 +143,7 @@ def create_app(service: Service) -> Litestar:
             cookie_httponly=True,
             exclude=WITHOUT_SESSION,
         ),
-        template_config=TemplateConfig(instance=_templates()),
+        template_config=TemplateConfig(instance=JinjaTemplateEngine.from_environment(templates())),
         stores={"sessions": kept},
         on_startup=[kept.delete_expired],
         exception_handlers=dict.fromkeys((HTTPException, *STATUS), _answer_to),  # pyright: ignore[reportArgumentType]
@@ -175,12 +174,6 @@ def _middleware(settings: ServiceSettings, largest: int) -> list[Any]:
     recognition = DefineMiddleware(Recognition, exclude=["^/static/"])
     bodies = DefineMiddleware(Bodies, largest=largest)
     return [guessing.middleware, sessions.middleware, recognition, bodies]
-
-
-def _templates() -> JinjaTemplateEngine:
-    made = environment().overlay(undefined=Undefined)  # forms are shown before and after they are filled in
-    made.filters["moment"] = moment  # pyright: ignore[reportUnknownMemberType]
-    return JinjaTemplateEngine.from_environment(made)
 
 
 def _state(service: Service) -> Any:

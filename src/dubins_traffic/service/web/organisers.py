@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
 from typing import Any
 
 from litestar import Controller, Response, get, post
 from litestar.datastructures import UploadFile
-from litestar.params import FromPath, MultipartBody, URLEncodedBody
+from litestar.params import FromPath, FromQuery, MultipartBody, URLEncodedBody
 from litestar.response import Redirect, Template
 from sqlalchemy import select
 
-from dubins_traffic.service import accounts, organising, queue, receiving, viewing
+from dubins_traffic.controllers import registry
+from dubins_traffic.service import accounts, archive, editing, organising, queue, receiving, viewing
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.database_tables import Account, Act, Competition, Submission, Team
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service
+from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import requests
-from dubins_traffic.service.web.pages import Form, page
+from dubins_traffic.service.web.pages import Form, asked, page
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
 
 Given = URLEncodedBody[Form]
@@ -29,6 +32,37 @@ class NewCompetition:
 
     address: str
     files: list[UploadFile]
+
+
+@dataclass
+class Files:
+    """The form with files of a competition."""
+
+    files: list[UploadFile]
+
+
+PHASE_ACTS: dict[str, Any] = {
+    "open": organising.open_phase,
+    "close": organising.close_phase,
+    "reveal": organising.reveal,
+    "reopen": organising.reopen_phase,
+}
+FOLLOWS = {
+    "open": "Teams may hand in from now on, and the commitment to secret seeds is published. A phase that has opened "
+    "can be closed, but not made to open later.",
+    "close": "What is handed in from now on does not count; what waits is still judged. Everybody sees the table, and "
+    "all trials and replays. The phase can be re-opened until its seeds are revealed, but what has been seen is known.",
+    "reveal": "Everybody can read the seeds and run the trials again. The phase can't be re-opened after that.",
+    "reopen": "Teams may hand in again, and what the phase does not show is hidden again; what has been seen since it "
+    "closed is known. Say so in an announcement.",
+    "disqualify": "It takes the submission out of the table, and its team reads why. Another submission of the team "
+    "counts in its stead, if there is one. It can be let in again.",
+    "readmit": "The submission counts again as any other, for no reason to disqualify it is given.",
+    "rejudge": "All its trials are run again, and the results so far no longer count; the database keeps them.",
+    "remove": "Name, password and tokens are deleted, and open invitations to the team and by the person end. "
+    "Submissions stay with the team. It can't be undone.",
+}
+"""What follows from acts that are asked for once more."""
 
 
 class Organisers(Controller):
@@ -51,10 +85,7 @@ class Organisers(Controller):
         data: MultipartBody[NewCompetition],
     ) -> Redirect:
         """Make a competition from its files."""
-        given = {item.filename: item.file.read() for item in data.files if item.filename}
-        if not given:
-            raise WrongEntryError("files: choose competition.toml and the files that it names")
-        made = organising.create(service, data.address, given, viewer.person)
+        made = organising.create(service, data.address, _given(data.files), viewer.person)
         return Redirect(f"/desk/c/{made.slug}", status_code=303)
 
     @post("/invite", sync_to_thread=True, status_code=200)
@@ -108,6 +139,14 @@ class Organisers(Controller):
             accounts.note(session, viewer.person, "reset", f"account {number}", "", service.clock())
         return _shown(service, viewer, reset=code)
 
+    @get("/accounts/{number:int}/remove", sync_to_thread=True)
+    def ask_removal(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
+        """Ask whether an account is to be removed."""
+        with service.database.reading() as session:
+            name = _account(session, number).name
+        where = f"/desk/accounts/{number}/remove"
+        return asked(service, viewer, where, f"Remove {name}", FOLLOWS["remove"], back="/desk")
+
     @post("/accounts/{number:int}/remove", sync_to_thread=True)
     def remove(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Remove an account."""
@@ -125,13 +164,85 @@ class Organisers(Controller):
                 viewing.competition_document(service, row),
                 queue.places(session, service.clock()),
             )
+            news = viewing.news(session, row)
             for phase, shown in zip(row.phases, document["phases"], strict=True):
                 its_submissions = receiving.submissions_of(session, phase, None)
                 shown["submissions"] = [
                     {"row": one, "team": one.team.name, "place": places.get(one.id)}
                     for one in its_submissions
                 ]
-        return page(service, viewer, "organise", f"Organise {document['title']}", competition=document)
+        given = {"competition": document, "news": news, "controllers": list(registry.names())}
+        return page(service, viewer, "organise", f"Organise {document['title']}", **given)
+
+    @get("/edit/{slug:str}", sync_to_thread=True)
+    def edit_page(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
+        """Show the forms that change a competition."""
+        with service.database.reading() as session:
+            row = receiving.competition_named(session, slug)
+            document, was = editing.present(service, row), _digest(row)
+            quotas = {phase.name: service.phase(phase).quota for phase in row.phases}
+        given = {"document": document, "slug": slug, "was": was, "quotas": quotas, "seconds": editing.seconds}
+        return page(service, viewer, "edit", f"Edit {document['title']}", **given)
+
+    @post("/edit/{slug:str}", sync_to_thread=True)
+    def edit(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], data: Given) -> Redirect:
+        """Change dates, quotas, texts and pages."""
+        with service.database.writing() as session:
+            row = receiving.competition_named(session, slug)
+            if data.get("was") != _digest(row):
+                raise RefusedError("somebody has changed it meanwhile: look at it again")
+            document = editing.edited_by_form(editing.present(service, row), data)
+            editing.edit(service, session, slug, document, viewer.person)
+        organising.publish_opened(service)
+        return Redirect(f"/desk/c/{slug}", status_code=303)
+
+    @post("/file/{slug:str}", sync_to_thread=True, opt={requests.FILES: True})
+    def edit_by_file(
+        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], data: MultipartBody[Files]
+    ) -> Redirect:
+        """Change a competition into what its file says."""
+        with service.database.reading() as session:
+            receiving.competition_named(session, slug)
+        editing.edit_by_files(service, slug, _given(data.files), viewer.person)
+        organising.publish_opened(service)
+        return Redirect(f"/desk/c/{slug}", status_code=303)
+
+    @post("/news/{slug:str}", sync_to_thread=True)
+    def announce(
+        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], data: Given
+    ) -> Redirect:
+        """Tell everybody something."""
+        with service.database.writing() as session:
+            row = receiving.competition_named(session, slug)
+            organising.announce(
+                service, session, row, viewer.person, data.get("title", ""), data.get("text", "")
+            )
+        return Redirect(f"/c/{slug}", status_code=303)
+
+    @post("/retract/{number:int}", sync_to_thread=True)
+    def retract(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Take an announcement back."""
+        with service.database.writing() as session:
+            slug = organising.retract(service, session, number, viewer.person)
+        return Redirect(f"/desk/c/{slug}", status_code=303)
+
+    @get("/c/{slug:str}/{name:str}/{act:str}", sync_to_thread=True)
+    def ask(
+        self,
+        service: ServiceHere,
+        viewer: ViewerHere,
+        slug: FromPath[str],
+        name: FromPath[str],
+        act: FromPath[str],
+    ) -> Template:
+        """Say what follows from an act, and ask whether it is wanted."""
+        if act not in PHASE_ACTS:
+            raise UnknownError("no such act")
+        with service.database.reading() as session:
+            receiving.phase_named(session, slug, name)
+        where, title = f"/desk/c/{slug}/{name}/{act}", f"{act.capitalize()} {name}"
+        until = "until" if act == "reopen" else ""
+        return asked(service, viewer, where, title, FOLLOWS[act], back=f"/desk/c/{slug}", until=until)
 
     @post("/c/{slug:str}/{name:str}/{act:str}", sync_to_thread=True)
     def act(
@@ -141,13 +252,19 @@ class Organisers(Controller):
         slug: FromPath[str],
         name: FromPath[str],
         act: FromPath[str],
+        data: Given,
     ) -> Redirect:
-        """Open, close or reveal a phase."""
-        acts = {"open": organising.open_phase, "close": organising.close_phase, "reveal": organising.reveal}
-        if act not in acts:
-            raise UnknownError("no such act")
+        """Open, close, re-open or reveal a phase, or hand in a built-in controller."""
         with service.database.writing() as session:
-            acts[act](service, session, receiving.phase_named(session, slug, name), viewer.person)
+            phase = receiving.phase_named(session, slug, name)
+            if act == "reopen":
+                organising.reopen_phase(service, session, phase, viewer.person, data.get("until", ""))
+            elif act == "baseline":
+                organising.add_baseline(service, session, phase, viewer.person, data.get("controller", ""))
+            elif act in PHASE_ACTS:
+                PHASE_ACTS[act](service, session, phase, viewer.person)
+            else:
+                raise UnknownError("no such act")
         organising.publish_opened(service)
         return Redirect(f"/desk/c/{slug}", status_code=303)
 
@@ -159,6 +276,33 @@ class Organisers(Controller):
             data = organising.export(service, session, row)
         headers = {"content-disposition": f'attachment; filename="{slug}.zip"'}
         return Response(data, media_type="application/zip", headers=headers)
+
+    @get("/c/{slug:str}/archive.zip", sync_to_thread=True)
+    def archive(self, service: ServiceHere, slug: FromPath[str]) -> Response[bytes]:
+        """Return a finished competition as a static site."""
+        with service.database.reading() as session:
+            data = archive.archive(service, session, receiving.competition_named(session, slug))
+        headers = {"content-disposition": f'attachment; filename="{slug}-site.zip"'}
+        return Response(data, media_type="application/zip", headers=headers)
+
+    @get("/s/{number:int}/{act:str}", sync_to_thread=True)
+    def ask_of_submission(
+        self,
+        service: ServiceHere,
+        viewer: ViewerHere,
+        number: FromPath[int],
+        act: FromPath[str],
+        why: FromQuery[str] = "",
+    ) -> Template:
+        """Say what follows from an act on a submission, and ask whether it is wanted."""
+        if act not in ("rejudge", "disqualify"):
+            raise UnknownError("no such act")
+        with service.database.reading() as session:
+            slug = receiving.submission_numbered(session, number, viewer.person).phase.competition.slug
+        told = "readmit" if act == "disqualify" and not why.strip() else act
+        title = f"{told.capitalize()} submission {number}"
+        where, back = f"/desk/s/{number}/{act}", f"/desk/c/{slug}"
+        return asked(service, viewer, where, title, FOLLOWS[told], back=back, why=why)
 
     @post("/s/{number:int}/{act:str}", sync_to_thread=True)
     def submission(
@@ -183,6 +327,19 @@ class Organisers(Controller):
             acts = session.scalars(select(Act).order_by(Act.id.desc()).limit(500)).all()
             names = {account.id: account.name for account in session.scalars(select(Account))}
         return page(service, viewer, "log", "Log of acts", acts=acts, names=names)
+
+
+def _given(files: list[UploadFile]) -> dict[str, bytes]:
+    given = {item.filename: item.file.read() for item in files if item.filename}
+    if not given:
+        raise WrongEntryError("files: choose competition.toml and the files that it names")
+    return given
+
+
+def _digest(row: Competition) -> str:
+    """Return what tells whether a competition is as it was when a form was shown."""
+    dates = [(phase.opens, phase.closes) for phase in row.phases]
+    return hashlib.sha256(f"{dates} {row.document}".encode()).hexdigest()
 
 
 def _account(session: viewing.Session, number: int) -> Account:

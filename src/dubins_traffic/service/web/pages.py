@@ -3,27 +3,34 @@
 from __future__ import annotations
 
 import secrets
-from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
-from typing import Any
+from typing import Annotated, Any
+from urllib.parse import quote
 
 from litestar import Controller, MediaType, Request, Response, get, post
 from litestar.datastructures import UploadFile
 from litestar.exceptions import NotFoundException
-from litestar.params import FromPath, FromQuery, MultipartBody, URLEncodedBody
+from litestar.params import FromPath, FromQuery, MultipartBody, QueryParameter, URLEncodedBody
 from litestar.response import Redirect, Template
 from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.competition import sealing
 from dubins_traffic.competition.competition import WALL_S
-from dubins_traffic.service import accounts, queue, receiving, standings, submissions, viewing
+from dubins_traffic.service import (
+    accounts,
+    comparing,
+    pictures,
+    queue,
+    receiving,
+    submissions,
+    texts,
+    viewing,
+)
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.database_tables import (
     Account,
     Competition,
-    Standing,
     Submission,
     Team,
     Token,
@@ -35,6 +42,7 @@ from dubins_traffic.service.service import Service
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.web import requests
 from dubins_traffic.service.web.requests import ServiceHere, Viewer, ViewerHere
+from dubins_traffic.viewer.pages import part
 
 Form = dict[str, str]
 TEMPLATES = "service/web/templates"
@@ -52,11 +60,23 @@ def page(service: Service, viewer: Viewer, template: str, title: str, /, **given
     return Template(f"{TEMPLATES}/{template}.html", context=context)
 
 
-def moment(at: float | None) -> str:
-    """Return a time as people read it, in UTC."""
-    return "" if at is None else datetime.fromtimestamp(at, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+def asked(
+    service: Service,
+    viewer: Viewer,
+    where: str,
+    title: str,
+    follows: str,
+    *,
+    back: str,
+    why: str = "",
+    until: str = "",
+) -> Template:
+    """Return the page that asks once before an act: what follows from it, and a form that does it."""
+    given = {"where": where, "follows": follows, "back": back, "why": why, "until": until}
+    return page(service, viewer, "confirm", title, **given)
 
 
+MINUTE, HOUR = 60, 3600
 REPLAY_POLICY = (
     "sandbox allow-scripts; default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
@@ -75,14 +95,29 @@ class Pages(Controller):
         with service.database.reading() as session:
             rows = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
             documents = [viewing.competition_document(service, row) for row in rows]
+            for row, document in zip(rows, documents, strict=True):
+                for phase, shown in zip(row.phases, document["phases"], strict=True):
+                    shown["left"] = phase.left(service.clock())
         return page(service, viewer, "home", "Competitions", competitions=documents)
 
     @get("/c/{slug:str}", sync_to_thread=True)
     def competition(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str]) -> Template:
         """Show a competition and its phases."""
         with service.database.reading() as session:
-            document = viewing.competition_document(service, receiving.competition_named(session, slug))
-        return page(service, viewer, "competition", document["title"], competition=document)
+            row = receiving.competition_named(session, slug)
+            document, news = viewing.competition_document(service, row), viewing.news(session, row)
+            for phase, shown in zip(row.phases, document["phases"], strict=True):
+                shown["left"] = phase.left(service.clock())
+                _, shown["places"] = viewing.latest_places(service, session, phase, viewer.account)
+                shown["replays"] = comparing.replays(service, session, phase, shown["places"], viewer.account)
+            line = comparing.timeline(row.phases, service.clock())
+        given = {"competition": document, "news": news, "line": line}
+        return page(service, viewer, "competition", document["title"], **given)
+
+    @get("/trial.svg", sync_to_thread=True)
+    def moving_trial(self) -> Response[str]:
+        """Return a trial that moves; `scripts.moving_trial` makes it."""
+        return _picture(part("service/web/static/trial.svg"), HOUR)
 
     @get("/c/{slug:str}/{name:str}", sync_to_thread=True)
     def phase(
@@ -100,9 +135,21 @@ class Pages(Controller):
                     viewing.submission_document(service, session, one, None, places, logs=False)
                     for one in its_submissions
                 ]
+                for one in mine:
+                    one["wait"] = comparing.wait_of(session, one["place"], at)
                 used = submissions.used(session, row, account.team_id, at)
-            title = row.competition.title
-        given = {"phase": document, "own": mine, "used": used, "slug": slug, "competition": title}
+            title, steps = (
+                row.competition.title,
+                comparing.steps(service, row, mine[::-1][-comparing.SHOWN :]),
+            )
+        given = {
+            "steps": steps,
+            "phase": document,
+            "own": mine,
+            "used": used,
+            "slug": slug,
+            "competition": title,
+        }
         largest = service.settings.largest_upload
         return page(
             service, viewer, "phase", f"{title}: {name}", largest=largest, wall_bounds=WALL_S, **given
@@ -110,24 +157,59 @@ class Pages(Controller):
 
     @get("/c/{slug:str}/{name:str}/table", sync_to_thread=True)
     def table(
-        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+        self,
+        service: ServiceHere,
+        viewer: ViewerHere,
+        slug: FromPath[str],
+        name: FromPath[str],
+        page_number: Annotated[int, QueryParameter(name="page", ge=0, le=1_000_000)] = 0,
     ) -> Template:
-        """Show the leaderboard of a phase and its history."""
-        at = service.clock()
+        """Show the leaderboard of a phase, and a page of its history."""
+        account, at = viewer.account, service.clock()
         with service.database.reading() as session:
             row = receiving.phase_named(session, slug, name)
-            phase, document = service.phase(row), viewing.phase_document(service, row, at)
-            sees = viewing.sees_table(row, viewer.account, at)
-            every: Sequence[Standing] = standings.history(session, row, service.hiding(row)) if sees else ()
-            whole = row.is_closed(at) or viewer.organiser
-            tables = [
-                (one.at, list(one.places) if whole else standings.shown_table(phase, one)) for one in every
-            ]
+            document, sees = viewing.phase_document(service, row, at), viewing.sees_table(row, account, at)
+            made, rows = viewing.latest_places(service, session, row, account)
+            past, older = viewing.past_places(service, session, row, account, page_number)
             title = row.competition.title
-        given = {"phase": document, "slug": slug, "competition": title, "sees": sees}
-        latest = tables[-1] if tables else None
-        past = tables[-21:-1][::-1]
-        return page(service, viewer, "table", f"{title}: {name}: table", latest=latest, past=past, **given)
+        given = {"phase": document, "slug": slug, "competition": title, "sees": sees, "number": page_number}
+        given |= {"made": made, "rows": rows, "past": past, "older": older}
+        return page(service, viewer, "table", f"{title}: {name}: table", **given)
+
+    @get("/c/{slug:str}/{name:str}/table.csv", sync_to_thread=True)
+    def csv_table(
+        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+    ) -> Response[str]:
+        """Return the table of a phase, as far as it may be seen, for spreadsheets."""
+        with service.database.reading() as session:
+            row = receiving.phase_named(session, slug, name)
+            _, rows = viewing.latest_places(service, session, row, viewer.account)
+        return Response(texts.csv_of(rows), media_type="text/csv; charset=utf-8")
+
+    @get("/c/{slug:str}/news.atom", sync_to_thread=True)
+    def feed(
+        self, request: Request[Any, Any, Any], service: ServiceHere, slug: FromPath[str]
+    ) -> Response[bytes]:
+        """Return the announcements of a competition as an Atom feed."""
+        with service.database.reading() as session:
+            row = receiving.competition_named(session, slug)
+            news = viewing.news(session, row)
+        url = f"{(service.settings.url or str(request.base_url)).rstrip('/')}/c/{slug}"
+        return Response(texts.feed(url, row.title, row.created, news), media_type="application/atom+xml")
+
+    @get("/pages/{slug:str}/{name:str}", sync_to_thread=True)
+    def text(
+        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
+    ) -> Template:
+        """Show a further text of a competition."""
+        with service.database.reading() as session:
+            row = receiving.competition_named(session, slug)
+            text = service.competition(row).model.pages.get(name)
+        if text is None:
+            raise NotFoundException("no such page")
+        return page(
+            service, viewer, "text", f"{row.title}: {name}", slug=slug, competition=row.title, text=text
+        )
 
     @get("/c/{slug:str}/{name:str}/commitment.json", sync_to_thread=True)
     def commitment(self, service: ServiceHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
@@ -175,15 +257,16 @@ class Pages(Controller):
         self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
     ) -> Response[bytes]:
         """Return the page that replays a trial, for a frame that may do nothing but draw."""
-        with service.database.reading() as session:
-            submission, row_of_trial = _seen(service, viewer, number, trial, session)
-            hiding = service.hiding(submission.phase)
-            digest = viewing.replay_of(row_of_trial, submission, viewer.account)
-        if digest is None:
-            raise NotFoundException("this trial has no replay")
         headers = {"content-encoding": "gzip", "content-security-policy": REPLAY_POLICY}
-        data = hiding.show(service.storage.get(digest, "replays"), replays_of(row_of_trial))
+        data = _replay(service, viewer, number, trial)
         return Response(data, media_type="text/html; charset=utf-8", headers=headers)
+
+    @get("/s/{number:int}/trials/{trial:int}/map.svg", sync_to_thread=True)
+    def small_map(
+        self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
+    ) -> Response[str]:
+        """Return a small map of a trial with the ways of its cars."""
+        return _picture(pictures.map_of(_replay(service, viewer, number, trial)), MINUTE)
 
     @get("/status", sync_to_thread=True)
     def status(self, service: ServiceHere, viewer: ViewerHere) -> Template:
@@ -192,6 +275,23 @@ class Pages(Controller):
             document = viewing.status_document(service, session)
             workers = viewing.workers(session) if viewer.organiser else []
         return page(service, viewer, "status", "Queue and workers", status=document, workers=workers)
+
+
+def _replay(service: Service, viewer: Viewer, number: int, trial: int) -> bytes:
+    """Return the page that replays a trial that somebody may see now, packed by gzip."""
+    with service.database.reading() as session:
+        submission, row_of_trial = _seen(service, viewer, number, trial, session)
+        hiding = service.hiding(submission.phase)
+        digest = viewing.replay_of(row_of_trial, submission, viewer.account)
+    if digest is None:
+        raise NotFoundException("this trial has no replay")
+    return hiding.show(service.storage.get(digest, "replays"), replays_of(row_of_trial))
+
+
+def _picture(drawn: str, seconds: int) -> Response[str]:
+    """Return a picture, which the browser of who asks may keep for so long."""
+    headers = {"content-security-policy": pictures.POLICY, "cache-control": f"private, max-age={seconds}"}
+    return Response(drawn, media_type="image/svg+xml", headers=headers)
 
 
 def _seen(
@@ -246,6 +346,25 @@ class Submitting(Controller):
         """Return the part of the page of a submission that changes."""
         return page(service, viewer, "live", "", **_view(service, viewer, number))
 
+    @get("/s/{number:int}/file", sync_to_thread=True)
+    def file(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Response[bytes]:
+        """Return what a team has sent."""
+        with service.database.reading() as session:
+            submission = receiving.submission_numbered(session, number, viewer.account)
+        name = quote(submission.filename, safe="")
+        headers = {"content-disposition": f"attachment; filename*=UTF-8''{name}"}
+        data = service.storage.get(submission.digest, "submissions")
+        return Response(data, media_type="application/octet-stream", headers=headers)
+
+    @get("/s/{number:int}/beside", sync_to_thread=True)
+    def beside(
+        self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], other: FromQuery[int]
+    ) -> Template:
+        """Show a submission beside another, trial by trial."""
+        with service.database.reading() as session:
+            shown = comparing.beside(service, session, number, other, viewer.account)
+        return page(service, viewer, "beside", f"Submissions {number} and {other}", **shown)
+
     @post("/s/{number:int}/cancel", sync_to_thread=True)
     def cancel(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Cancel a submission."""
@@ -267,8 +386,20 @@ def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
             service, session, submission, viewer.account, places, logs=False
         )
         differing = viewing.differing(service, session, submission) if "trials" in document else []
-        closed = submission.phase.is_closed(service.clock())
-    return {"submission": document, "differing": differing, "closed": closed}
+        given: dict[str, Any] = {
+            "differing": differing,
+            "closed": submission.phase.is_closed(service.clock()),
+        }
+        if "trials" in document:
+            given["strip"] = comparing.strip(service, session, submission)
+            given["rivals"] = comparing.rivals(service, session, submission, viewer.account)
+        wait = comparing.wait_of(session, document["place"], service.clock())
+    return {
+        "submission": document,
+        "wait": wait,
+        "metric": service.phase(submission.phase).ranking.metric,
+        **given,
+    }
 
 
 Given = URLEncodedBody[Form]
@@ -294,6 +425,28 @@ class Teams(Controller):
             if account.team_id is not None:
                 raise RefusedError("you are in a team already")
             account.team_id = accounts.make_team(session, data.get("name", ""), service.clock()).id
+        return Redirect("/team", status_code=303)
+
+    @get("/members/{number:int}/remove", sync_to_thread=True)
+    def ask_leaving(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
+        """Ask whether somebody is to leave the team."""
+        with service.database.reading() as session:
+            member = _member(session, viewer, number)
+        title = "Leave the team" if number == viewer.person.id else f"Remove {member.name}"
+        follows = (
+            "The submissions stay with the team, and the account stays as it is. Open invitations to the team end; "
+            "only a new one leads back into it."
+        )
+        return asked(service, viewer, f"/team/members/{number}/remove", title, follows, back="/team")
+
+    @post("/members/{number:int}/remove", sync_to_thread=True)
+    def leave(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
+        """Take a member, such as oneself, out of the team."""
+        with service.database.writing() as session:
+            member = _member(session, viewer, number)
+            subject = f"account {number}, team {member.team_id}"
+            accounts.note(session, viewer.person, "leave team", subject, "", service.clock())
+            accounts.leave(session, member, service.clock())
         return Redirect("/team", status_code=303)
 
     @post("/invite", sync_to_thread=True, status_code=200)
@@ -362,6 +515,13 @@ class Teams(Controller):
         return Redirect("/", status_code=303)
 
 
+def _member(session: Session, viewer: Viewer, number: int) -> Account:
+    member = session.get(Account, number) if number < 1 << 31 else None
+    if member is None or viewer.team is None or member.team_id != viewer.team.id:
+        raise UnknownError("no such member of your team")
+    return member
+
+
 def _sure(service: Service, viewer: Viewer, data: Form) -> Account:
     """Return the own account, if the password given is its."""
     with service.database.reading() as session:
@@ -382,10 +542,11 @@ def _still(session: Session, sure: Account) -> Account:
 def _shown(service: Service, viewer: Viewer, code: str = "", token: str = "") -> Template:
     with service.database.reading() as session:
         team = session.get(Team, viewer.person.team_id) if viewer.person.team_id else None
-        members = [member.name for member in team.accounts] if team else []
+        members = [(member.id, member.name) for member in team.accounts] if team else []
+        phases = comparing.team_places(service, session, viewer.person, team.id) if team else []
         tokens = accounts.tokens(session, viewer.person)
         invitations = () if team is None else accounts.invitations(session, service.clock(), team.id)
-    given = {"team": team, "members": members, "tokens": tokens, "invitations": invitations}
+    given = {"team": team, "members": members, "tokens": tokens, "invitations": invitations, "phases": phases}
     return page(
         service, viewer, "team", "Team and account", url=service.settings.url, code=code, token=token, **given
     )
