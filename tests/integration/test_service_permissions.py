@@ -107,6 +107,10 @@ ROUTES: dict[tuple[str, str], tuple[str, set[str]]] = {
     ("GET", "/worker/submissions/{digest:str}"): (f"/worker/submissions/{'0' * 64}", {WORKER}),
     ("POST", "/worker/lease"): ("", {WORKER}),
     ("POST", "/worker/chunks/{number:int}/heartbeat"): ("/worker/chunks/999/heartbeat", {WORKER}),
+    ("POST", "/worker/chunks/{number:int}/trials/{trial:int}/seed"): (
+        "/worker/chunks/999/trials/0/seed",
+        {WORKER},
+    ),
     ("POST", "/worker/chunks/{number:int}/done"): ("/worker/chunks/999/done", {WORKER}),
     ("POST", "/worker/chunks/{number:int}/release"): ("/worker/chunks/999/release", {WORKER}),
     ("PUT", "/worker/chunks/{number:int}/replays"): ("/worker/chunks/999/replays?token=1", {WORKER}),

@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import base64
+import contextlib
 import gzip
 import io
 import json
 import re
+import sqlite3
+import struct
 import tempfile
 import zipfile
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
 
+import httpx
 import pytest
 from sqlalchemy import select
 
-from dubins_traffic.competition.sealing import make_key_file
-from dubins_traffic.errors import InputError
+from dubins_traffic.competition.sealing import make_key_file, unsealed
 from dubins_traffic.service import viewing
 from dubins_traffic.service.database_tables import Phase, Submission, Trial
 from dubins_traffic.service.hiding import HiddenError
+from dubins_traffic.service.service import NoKeyError
 from dubins_traffic.service.service import Service as StoredService
 from tests import postgres
 from tests.services import CRASHING, Person, competition_text, serving, wait_until
@@ -52,9 +56,29 @@ def forms(seed: int) -> set[bytes]:
     return plain | packed | {little.hex().encode()}
 
 
+def float_forms(value: float) -> set[bytes]:
+    """Return a number as it may be written: digits, eight bytes in either order, these as hexadecimal and Base64."""
+    found = {repr(value).encode(), f"{value:.9g}".encode()}
+    for order in "<>":
+        packed = struct.pack(f"{order}d", value)
+        found |= {packed, packed.hex().encode(), packed.hex().upper().encode()}
+        for before in range(3):
+            whole = base64.b64encode(bytes(before) + packed)
+            found.add(whole[-(-before * 8 // 6) : (before + 8) * 8 // 6])
+    return found
+
+
+def is_telling(value: object) -> bool:
+    """Tell whether a number has so many digits that it stands nowhere by chance."""
+    return isinstance(value, float) and len(repr(value)) >= 12
+
+
 def unpacked(data: bytes) -> Iterator[bytes]:
-    """Yield bytes, and what is packed by gzip in them."""
+    """Yield bytes, what is packed by gzip in them, and the members of an archive."""
     yield data
+    if zipfile.is_zipfile(io.BytesIO(data)):
+        with zipfile.ZipFile(io.BytesIO(data)) as archive:
+            yield from (archive.read(name) for name in archive.namelist())
     for found in re.finditer(rb"\x1f\x8b\x08", data):
         try:
             yield zlib.decompressobj(31).decompress(data[found.start() :])
@@ -65,7 +89,7 @@ def unpacked(data: bytes) -> Iterator[bytes]:
 def holding(folders: list[Path], wanted: set[bytes]) -> list[str]:
     """Return the files in which something wanted stands."""
     found: list[str] = []
-    for path in (each for folder in folders for each in sorted(folder.rglob("*"))):
+    for path in (each for folder in folders for each in (folder, *sorted(folder.rglob("*")))):
         try:
             data = path.read_bytes() if path.is_file() else b""
         except FileNotFoundError:  # of a worker that has just removed it
@@ -111,6 +135,17 @@ def test_a_seed_is_found_however_it_is_written(tmp_path: Path, form: int) -> Non
     assert holding([tmp_path], forms(seed ^ 1 << 40)) == []
 
 
+@pytest.mark.parametrize("order", "<>")
+def test_a_number_is_found_in_a_member_of_an_archive(tmp_path: Path, order: str) -> None:
+    value = 4.830800685677691
+    packed = struct.pack(f"{order}d", value)
+    for data in (repr(value).encode(), packed, packed.hex().encode(), base64.b64encode(b"a" + packed)):
+        with zipfile.ZipFile(tmp_path / "archive", "w", zipfile.ZIP_DEFLATED) as archive:
+            archive.writestr("member", b"before " + data + b" after")
+        assert holding([tmp_path], float_forms(value)) == [str(tmp_path / "archive")]
+        assert holding([tmp_path], float_forms(value + 1.0)) == []
+
+
 def a_season(tmp_path: Path, settings: str, also: list[Path]) -> None:
     """Judge two submissions in phases that hide their trials, and look at every byte until these may be seen."""
     folder = tmp_path / "here"
@@ -124,9 +159,14 @@ def a_season(tmp_path: Path, settings: str, also: list[Path]) -> None:
         secret = {form for own in seeds.values() for seed in own for form in forms(seed)}
         secret |= {SAID.encode(), base64.b64encode(SAID.encode()), b"counted_rounds"}
         numbers = [person.submit(f"short/{phase}", text) for phase in SECRET for text in (SAYING, CRASHING)]
-        looked_at = [folder, *also]
+        looked_at = [folder, folder.with_suffix(".log"), *also]
+        secret |= planted_in(folder)
         assert wait_until(lambda: holding(looked_at, secret) or all_ended(person, numbers)) is True
         assert holding(looked_at, secret) == []
+        results = results_of(folder, numbers)
+        assert len(results) > 20
+        copied(folder, tmp_path / "copies", organiser)
+        assert holding([*looked_at, tmp_path / "copies"], secret | results) == []
         assert len(list((folder / "store" / "replays").rglob("*/*"))) > 4
         shown_to_organisers(organiser, numbers[2])
         unreadable(folder, tmp_path / "other.key", numbers[2])
@@ -152,6 +192,47 @@ def seeds_of(folder: Path) -> dict[str, tuple[int, ...]]:
     return found
 
 
+def planted_in(folder: Path) -> set[bytes]:
+    """Return the salts of the secret phases, and where the cars of their trials begin, in all forms."""
+    stored = StoredService(folder, folder.with_suffix(".key"))
+    found: set[bytes] = set()
+    with stored.database.reading() as session:
+        for row in session.scalars(select(Phase).where(Phase.name.in_(SECRET))).all():
+            phase, seeds = stored.phase(row), stored.seeds(row)
+            salt = unsealed(phase, stored.needed_key()).salt
+            found |= {salt.encode(), bytes.fromhex(salt), base64.b64encode(bytes.fromhex(salt))}
+            starts = [start for k, seed in enumerate(seeds) for start in phase.instance(k, seed).starts]
+            places = [place for start in starts for place in (start.x, start.y)]
+            found |= {form for place in filter(is_telling, places) for form in float_forms(place)}
+    stored.close()
+    return found
+
+
+def results_of(folder: Path, numbers: list[int]) -> set[bytes]:
+    """Return the numbers in the results of submissions that tell something, in all forms."""
+    stored = StoredService(folder, folder.with_suffix(".key"))
+    with stored.database.reading() as session:
+        submissions = [session.get_one(Submission, number) for number in numbers]
+        rows = [viewing.trial_of(stored, session, own, 0) for own in submissions]
+        values = [value for row in rows if row is not None for value in row.row.values()]
+    stored.close()
+    return {form for value in filter(is_telling, values) for form in float_forms(value)}
+
+
+def copied(folder: Path, to: Path, organiser: Person) -> None:
+    """Make a backup of a database that is a file, and keep what the service says to who measures it."""
+    to.mkdir()
+    metrics = httpx.get(f"{organiser.url}/metrics", headers={"authorization": f"Bearer {organiser.token}"})
+    assert metrics.status_code == 200
+    (to / "metrics").write_bytes(metrics.content)
+    if (folder / "service.db").exists():
+        with (
+            contextlib.closing(sqlite3.connect(folder / "service.db")) as source,
+            contextlib.closing(sqlite3.connect(to / "service.db")) as target,
+        ):
+            source.backup(target)
+
+
 def all_ended(person: Person, numbers: list[int]) -> bool:
     return all(person.state(number) in ("done", "finished") for number in numbers)
 
@@ -164,8 +245,13 @@ def shown_to_organisers(organiser: Person, number: int) -> None:
 
 def unreadable(folder: Path, other: Path, number: int) -> None:
     """With another key nothing can be read, and nothing of one trial stands for another."""
-    with pytest.raises(InputError, match="no such key, and the folder has competitions"):
-        StoredService(folder, other)
+    keyless = StoredService(folder, other)
+    with keyless.database.reading() as session:
+        assert [row.name for row in keyless.waiting_for_key(session)] == list(SECRET)
+        with pytest.raises(NoKeyError, match="no key for what is secret"):
+            viewing.trial_of(keyless, session, session.get_one(Submission, number), 0)
+    keyless.close()
+    assert not other.exists()
     make_key_file(other, folder)
     stored, own = StoredService(folder, other), StoredService(folder, folder.with_suffix(".key"))
     with stored.database.reading() as session:

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.service import unpacked as room
 from dubins_traffic.service.unpacked import Unpacked
 
 CONTROLLER = b"class Controller:\n    def act(self, observation):\n        return 0.2, 0.1\n"
@@ -45,6 +46,21 @@ def test_what_is_in_use_is_kept_by_whatever_worker(tmp_path: Path) -> None:
     with mine.held(source(1)) as again:
         assert again.path == submission.path
         assert kept(tmp_path) > 1000
+
+
+def test_what_a_killed_worker_left_half_removed_is_removed(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unpacked = Unpacked(tmp_path, most=0)
+    with unpacked.held(source(1)):
+        pass
+    with monkeypatch.context() as killed:
+        killed.setattr(room.shutil, "rmtree", lambda *_, **__: (_ for _ in ()).throw(KeyboardInterrupt))
+        with pytest.raises(KeyboardInterrupt):
+            unpacked.clear()
+    assert [path.name[:5] for path in tmp_path.iterdir()] == [".old-"]
+    unpacked.clear()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_what_was_not_used_for_long_is_removed(tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from dubins_traffic.cli import options
+from dubins_traffic.cli import faults, options
 
 EXAMPLES = options.examples(
     "serve season --competition spring",
@@ -72,7 +72,13 @@ def serve(
     if workers:
         check_boxes(trust=trust)
     place = Path(folder)
-    service = Service(place, default_key(place) if key_file is None else Path(key_file))
+    key = default_key(place) if key_file is None else Path(key_file)
+    known = key.exists()
+    service = Service(place, key)
+    if not known and key.exists():
+        faults.tell(f"{key}: a new key; who loses it has no results: keep a copy elsewhere")
+    elif not known:
+        faults.tell(f"{key}: no such key; phases with secrets are not judged until it is there")
     opened = listening.listen(host, port)
     url = listening.address_of(opened)
     joining = serving.prepare(service, [Path(path) for path in competition or ()], url)

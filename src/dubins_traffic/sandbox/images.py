@@ -6,6 +6,7 @@ root of a box, read-only, with the same layers as every box.
 
 from __future__ import annotations
 
+import contextlib
 import errno
 import gzip
 import hashlib
@@ -15,6 +16,7 @@ import shutil
 import subprocess
 import tarfile
 import tempfile
+import time
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -32,6 +34,8 @@ MOST: Final = 512 << 20
 MOST_FILES: Final = 50_000
 WAIT: Final = 300.0
 """Seconds that podman has for one step."""
+KEPT_S: Final = 7 * 86400.0
+"""Seconds for which an unpacked image is kept that nobody uses; no trial takes so long."""
 OURS: Final = ("proc", "dev", "tmp", ".box")
 """Folders at the top of an image that a box covers with its own."""
 PACKED_OTHERWISE: Final = (b"\x28\xb5\x2f\xfd", b"\xfd7zXZ", b"BZh")
@@ -80,7 +84,9 @@ def unpacked(archive: Path, store: Path | None = None) -> Image:
             place = store / hashlib.file_digest(file, "sha256").hexdigest()
         if not place.is_dir():
             store.mkdir(parents=True, exist_ok=True)
+            _remove_unused(store)
             _unpack(archive, store, place)
+        os.utime(place)
         document = json.loads((place / "image.json").read_text(encoding="utf-8"))
     except OSError as error:
         raise InputError(f"can't be unpacked ({error.strerror})", file=str(archive)) from error
@@ -140,6 +146,14 @@ class _Podman:
             lines = done.stderr.decode(errors="replace").strip().splitlines() or ["it does not say why"]
             raise InputError(shown(lines[0], 200), field=f"podman {words[0]}", expected=_EXPECTED)
         return done.stdout.decode(errors="replace").strip()
+
+
+def _remove_unused(store: Path) -> None:
+    """Remove images that nobody has used for so long that no box can see them any more."""
+    for path in store.iterdir():
+        with contextlib.suppress(FileNotFoundError):  # another process may be removing it
+            if path.stat().st_mtime < time.time() - KEPT_S:
+                shutil.rmtree(path)
 
 
 def _unpack(archive: Path, store: Path, place: Path) -> None:

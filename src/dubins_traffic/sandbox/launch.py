@@ -34,6 +34,13 @@ STAGE: Final = 1 << 30
 OURS: Final = "/.box"
 """Where a box that sees an image has the shell that sets its limits."""
 DEVICES: Final = ("null", "zero", "full", "random", "urandom")
+HOST_STATE: Final = (
+    *("loadavg", "stat", "uptime", "meminfo", "vmstat", "zoneinfo", "buddyinfo", "pagetypeinfo", "slabinfo"),
+    *("diskstats", "swaps", "interrupts", "softirqs", "schedstat", "timer_list", "key-users", "locks"),
+    *("cgroups", "sys/fs/file-nr", "sys/fs/inode-nr", "sys/fs/inode-state", "sys/fs/dentry-state"),
+    *("pressure/cpu", "pressure/io", "pressure/memory", "pressure/irq"),
+)
+"""Files of /proc that tell how busy the host is, whatever the namespaces: no box can open them."""
 SETTINGS: Final = ("ld.so.cache", "ld.so.conf", "ld.so.conf.d", "alternatives")
 """What is seen of /etc: what the dynamic linker needs."""
 STANDS: Final = "dubins-traffic: the box stands"
@@ -215,8 +222,16 @@ def _bubblewrap(program: Program, shown: Sequence[Shown], limits: Limits, layers
     if program.image:
         words += _around_an_image()
     words += ["--proc", "/proc"] if PIDS in layers else ["--ro-bind", "/proc", "/proc"]
+    words += _without_load()
     words += ["--size", str(limits.files), "--tmpfs", "/tmp", "--chdir", "/tmp"]
     return [*words, "--remount-ro", "/"]
+
+
+@cache
+def _without_load() -> list[str]:
+    """Return the options of bubblewrap that put a device which nobody can open there over each of `HOST_STATE`."""
+    paths = [path for name in HOST_STATE if (path := Path("/proc") / name).exists()]
+    return [word for path in paths for word in ("--ro-bind", "/dev/null", str(path))]
 
 
 @cache

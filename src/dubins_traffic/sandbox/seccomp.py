@@ -31,7 +31,7 @@ ALLOWED: Final = """
     sched_get_priority_min getpriority getcpu
     nanosleep clock_nanosleep clock_gettime clock_getres gettimeofday time times timer_create timer_settime
     timer_gettime timer_getoverrun timer_delete
-    getuid geteuid getgid getegid getresuid getresgid getgroups getrlimit setrlimit prlimit64 getrusage sysinfo uname
+    getuid geteuid getgid getegid getresuid getresgid getgroups getrlimit setrlimit prlimit64 getrusage uname
     getrandom capget recvfrom recvmsg sendto sendmsg shutdown getsockname getpeername getsockopt setsockopt
 """
 """What programs need that compute, read and write files of their own, and begin threads and processes."""

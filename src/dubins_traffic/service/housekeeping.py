@@ -35,6 +35,9 @@ def end_silent(service: Service, *, was_away: bool = False) -> None:
         if was_away:
             queue.renew(session, service.clock() + service.settings.lease)
         end_leases(session, service.clock())
+        unjudged = [row.id for row in service.waiting_for_key(session)]
+        if unjudged:
+            submissions.stay(session, unjudged, service.clock())
         end_overdue(session, service.clock())
 
 
@@ -67,6 +70,8 @@ def check_podiums(service: Service) -> None:
             Phase.closes <= service.clock(), Phase.podium_checked.is_(False), Phase.shows != "all"
         )
         for phase in session.scalars(due).all():
+            if service.waits_for_key(phase):
+                continue
             active = Submission.state.in_(submissions.ACTIVE)
             busy = session.scalars(
                 select(Submission.id).where(Submission.phase_id == phase.id, active).limit(1)

@@ -46,13 +46,20 @@ def add(session: Session, submission: Submission, kind: str, chunks: Sequence[Se
     session.flush()
 
 
-def take(session: Session, worker: str, at: float, seconds: float) -> Chunk | None:
+def take(
+    session: Session, worker: str, at: float, seconds: float, unjudged: Sequence[int] = ()
+) -> Chunk | None:
     """Lease the chunk that is next to a worker, for so many seconds; None if nothing waits.
+
+    Of the phases `unjudged` submissions are checked alone.
 
     Next is the team for which workers have worked the least; of its chunks checks come first, then what is run again,
     so that a submission is finished before the next is begun, then the oldest.
     """
-    due = (Chunk.state == "waiting", or_(Chunk.leased_until.is_(None), Chunk.leased_until <= at))
+    due = [Chunk.state == "waiting", or_(Chunk.leased_until.is_(None), Chunk.leased_until <= at)]
+    if unjudged:
+        waits = select(Submission.id).where(Submission.phase_id.in_(unjudged))
+        due.append(or_(Chunk.kind == "check", Chunk.submission_id.not_in(waits)))
     teams = session.scalars(select(Chunk.team_id).where(*due).distinct()).all()
     if not teams:
         return None

@@ -99,6 +99,10 @@ def secret_in(folder: Path, name: str) -> str:
 Clock = Callable[[], float]
 
 
+class NoKeyError(InputError):
+    """The key of what is secret is not there; what needs it waits until it is."""
+
+
 class Service:
     """What every part of the service works with.
 
@@ -107,7 +111,8 @@ class Service:
     folder : Path
         The folder of the service; made if missing.
     key_file : Path, optional
-        The key of secret seeds, outside of `folder`; drawn if there is none. Without it there are no secret seeds.
+        The key of secret seeds, outside of `folder`; drawn while there are no competitions. While it is missing,
+        phases that need it are not judged; judging goes on as soon as it is there.
     clock : callable
         Seconds since 1970, UTC.
     """
@@ -120,7 +125,8 @@ class Service:
         self.database = Database(self.settings.database or f"sqlite:///{folder / 'service.db'}")
         self.storage = Storage(self.settings.storage or str(folder / "store"))
         self.cookie_secret = secret_in(folder, "cookies.key")
-        self._key = None if key_file is None else _key(key_file, folder)
+        self.key_file = key_file
+        self._read_key = None if key_file is None else _key(key_file, folder)
         self._competitions: dict[int, tuple[str, files.Competition]] = {}
         self._seeds: dict[tuple[int, str], tuple[int, ...]] = {}
         self._hidings: dict[int, Hiding] = {}
@@ -149,13 +155,14 @@ class Service:
         phase = self.phase(row)
         which = (row.id, phase.rules)
         if which not in self._seeds:
-            self._seeds[which] = phase.seeds(self._key)
+            key = self.needed_key() if phase.secret and not exists(sealing.revealed_path(phase)) else None
+            self._seeds[which] = phase.seeds(key)
         return self._seeds[which]
 
     def hiding(self, row: Phase) -> Hiding:
         """Return what hides the results of a phase, all that is kept of them; of one that shows all, nothing is hidden.
 
-        InputError if there is no key.
+        NoKeyError if there is no key.
         """
         if row.shows == "all":
             return NOTHING
@@ -164,12 +171,27 @@ class Service:
         return self._hidings[row.id]
 
     def needed_key(self) -> bytes:
-        """Return what unlocks secret seeds; InputError if there is no key."""
-        if self._key is None:
-            raise InputError(
+        """Return what unlocks secret seeds, as soon as its file is there; NoKeyError if it is not."""
+        if self._read_key is None and self.key_file is not None and exists(self.key_file):
+            self._read_key = sealing.read_key(self.key_file, self.folder)
+        if self._read_key is None:
+            raise NoKeyError(
                 "no key for what is secret", file="--key-file", expected="a key file outside the folder"
             )
-        return self._key
+        return self._read_key
+
+    def waits_for_key(self, row: Phase) -> bool:
+        """Tell whether a phase is not judged because the key is not there."""
+        try:
+            self.needed_key()
+        except NoKeyError:
+            return row.shows != "all" or (row.commitment is not None and row.revealed is None)
+        return False
+
+    def waiting_for_key(self, session: Session) -> list[Phase]:
+        """Return the phases that are not judged because the key is not there."""
+        rows = session.scalars(select(Phase).options(joinedload(Phase.competition)).order_by(Phase.id))
+        return [row for row in rows.all() if self.waits_for_key(row)]
 
     def close(self) -> None:
         """Let go of the database."""
@@ -202,14 +224,10 @@ def _moment(at: float | None) -> datetime | None:
     return None if at is None else datetime.fromtimestamp(at, UTC)
 
 
-def _key(path: Path, folder: Path) -> bytes:
+def _key(path: Path, folder: Path) -> bytes | None:
     if not path.exists():
         if any((folder / "competitions").glob("*/")):  # a new key would read nothing of what they hold
-            raise InputError(
-                "no such key, and the folder has competitions",
-                file=str(path),
-                expected="the key with which they were made (--key-file)",
-            )
+            return None
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         sealing.make_key_file(path, folder)
     return sealing.read_key(path, folder)

@@ -25,6 +25,7 @@ from dubins_traffic.service.database_tables import Account, Code, Competition, T
 from dubins_traffic.service.housekeeping import Housekeeper
 from dubins_traffic.service.service import Service, competition_of
 from dubins_traffic.service.web.app import create_app
+from dubins_traffic.service.web.patience import PatientProtocol
 
 log = structlog.get_logger("dubins_traffic.service")
 WATCH_S = 1.0
@@ -191,6 +192,7 @@ def serve(
     """
     config = uvicorn.Config(
         create_app(service),
+        http=PatientProtocol,
         proxy_headers=True,
         forwarded_allow_ips=",".join(service.settings.proxies),
         server_header=False,

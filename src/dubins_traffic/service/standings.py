@@ -58,9 +58,8 @@ def refresh(service: Service) -> None:
     """Rank the phases whose results have changed, and end the submissions that waited for it."""
     scoring = select(Submission.phase_id).where(Submission.state == "scoring")
     with service.database.reading() as session:
-        due = session.scalars(
-            select(Phase.id).where((Phase.version > Phase.ranked) | Phase.id.in_(scoring))
-        ).all()
+        changed = select(Phase).where((Phase.version > Phase.ranked) | Phase.id.in_(scoring))
+        due = [row.id for row in session.scalars(changed) if not service.waits_for_key(row)]
     for number in due:
         try:
             _rank_phase(service, number)

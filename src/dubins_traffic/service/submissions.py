@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from typing import Any
 
-from sqlalchemy import func, select
+from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session, defer, undefer
 
 from dubins_traffic.competition.competition import Quota
@@ -172,6 +172,13 @@ def taken(submission: Submission, chunk: Chunk, at: float) -> None:
         enter(submission, "checking", at)
     elif submission.state == "queued":
         enter(submission, "running", at)
+
+
+def stay(session: Session, phases: Sequence[int], at: float) -> None:
+    """Let the submissions to phases that are not judged now stay in their states as long as if they began."""
+    for state in ACTIVE:
+        of_them = (Submission.phase_id.in_(phases), Submission.state == state)
+        session.execute(update(Submission).where(*of_them).values(deadline=at + DEADLINES[state]))
 
 
 def accept(session: Session, submission: Submission, numbers: Sequence[int], at: float) -> None:

@@ -19,6 +19,8 @@ AGE_S = 86400.0
 """What has not been used for so long is removed."""
 MOST = 2 << 30
 """Bytes of all together, beyond which what was used longest ago is removed."""
+AWAY = ".old-"
+"""With this begins the name of a folder that is being removed."""
 PAUSE_S = 60.0
 """Seconds between two looks at all of them."""
 
@@ -54,7 +56,12 @@ class Unpacked:
             os.close(handle)
 
     def clear(self) -> None:
-        """Remove what is too old, and of the rest what was used longest ago while all are too large."""
+        """Remove what is too old, and of the rest what was used longest ago while all are too large.
+
+        What a worker had put out of the way, and that was killed before it was removed, goes first.
+        """
+        for path in self._folder.glob(f"{AWAY}*"):
+            shutil.rmtree(path, ignore_errors=True)  # another worker may be removing it
         found = sorted((used, path) for path in self._paths() if (used := _used(path)) is not None)
         sizes = {path: _size(path) for _, path in found}
         total, now = sum(sizes.values()), time.time()
@@ -88,7 +95,7 @@ def _remove(path: Path) -> bool:
     if handle is None:
         return False
     try:
-        away = path.with_name(f".old-{path.name}")
+        away = path.with_name(f"{AWAY}{path.name}")
         path.rename(away)
         shutil.rmtree(away)
     finally:

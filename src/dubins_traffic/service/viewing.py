@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from typing import Any
 
@@ -80,7 +80,7 @@ def latest_places(
     service: Service, session: Session, row: Phase, account: Account | None
 ) -> tuple[float | None, list[dict[str, Any]]]:
     """Return when the latest table of a phase was made, and its places as somebody may see them now."""
-    if not sees_table(row, account, service.clock()):
+    if not sees_table(row, account, service.clock()) or service.waits_for_key(row):
         return None, []
     latest = standings.latest_standing(session, row, service.hiding(row))
     return latest and latest.at, places_in(service, row, latest, account)
@@ -134,6 +134,7 @@ def phase_document(service: Service, row: Phase, at: float) -> dict[str, Any]:
         "ranking": phase.ranking.model_dump(),
         "commitment": row.commitment,
         "revealed": iso(row.revealed),
+        "waits_for_key": service.waits_for_key(row),
     }
 
 
@@ -157,7 +158,9 @@ def submission_document(
         iso(submission.received),
         place,
     )
-    trials = submissions.trials(session, submission, service.hiding(row), logs=logs)
+    trials: Sequence[Trial] = ()
+    if not service.waits_for_key(row):
+        trials = submissions.trials(session, submission, service.hiding(row), logs=logs)
     results = standings.judged(trials, logs=logs)
     now = datetime.fromtimestamp(service.clock(), UTC)
     phase = service.phase(row)

@@ -1,6 +1,6 @@
 """A worker: it asks a service for work, judges trials in the sandbox, and reports under the token of its lease.
 
-It knows nothing but an address and a token; seeds come with the work and are gone with it.
+It knows nothing but an address and a token; the seed of a trial comes when it is run, and is gone with it.
 """
 
 from __future__ import annotations
@@ -159,13 +159,11 @@ class Worker:
             if lease["kind"] == "check":
                 return {"content": submission.digest}
             phase = Competition.from_document(lease["competition"]).phase(lease["phase"])
-            seeds = {int(number): int(seed) for number, seed in lease["seeds"].items()}
-            return self._judged(phase, seeds, submission, lease, lost)
+            return self._judged(phase, submission, lease, lost)
 
     def _judged(
         self,
         phase: Phase,
-        seeds: dict[int, int],
         submission: Submission,
         lease: dict[str, Any],
         lost: threading.Event,
@@ -174,7 +172,9 @@ class Worker:
         trials: list[dict[str, Any]] = []
         began = time.monotonic()
         again = lease["kind"] == "again"
-        for judged in judge(phase, numbers, submission, seeds=seeds, trust=self._trust, remember=not again):
+        for number in numbers:
+            seeds = {number: self._seed(number, lease, lost)}
+            (judged,) = judge(phase, [number], submission, seeds=seeds, trust=self._trust, remember=not again)
             if not judged.counts:
                 raise DubinsTrafficError(f"trial {judged.number}: {judged.end}: {judged.row['reason']}")
             trials.append({**judged.to_json(), **self._replays(judged, lease, lost)})
@@ -183,6 +183,13 @@ class Worker:
             if self._stopping.is_set() or time.monotonic() - began > LONGEST_S:
                 break
         return {"trials": trials}
+
+    def _seed(self, number: int, lease: dict[str, Any], lost: threading.Event) -> int:
+        """Return the seed of a trial that is run next; the service gives one at a time."""
+        where, token = f"/worker/chunks/{lease['chunk']}/trials/{number}/seed", {"token": lease["token"]}
+        return int(
+            self._service.patiently(lambda: self._service.post(where, token), self._over(lost))["seed"]
+        )
 
     def _over(self, lost: threading.Event) -> Callable[[], bool]:
         """Return what tells that a lease is of no use any more."""

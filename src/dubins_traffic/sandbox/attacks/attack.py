@@ -268,6 +268,10 @@ got = call(311, os.getpid(), pair(into), 1, pair(own), 1, 0)
     _call("makes a device", "os.mknod('/tmp/device', 0o20666, os.makedev(1, 1)); got = 'made'", alone=False),
     _call("makes a fifo", "os.mkfifo('/tmp/fifo' + str(os.getpid())); got = 'made'; os.unlink('/tmp/fifo' + str(os.getpid()))"),
     _call("watches a file system", "got = call(300, 0, 0)", alone=False),
+    _call("asks for the load and the free memory of the host", """
+told = ctypes.create_string_buffer(256); call(99, told)
+got = struct.unpack_from('QQQQQQ', told)
+"""),
     _call("becomes root", "os.setresuid(0, 0, 0); got = 'root'", alone=False),
     _call("becomes itself again", "os.setuid(os.getuid()); got = 'changed'"),
     _call("joins other groups", "os.setgroups([0]); got = 'joined'", alone=False),
@@ -400,6 +404,13 @@ with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as there:
     Attack("lists shared memory of the host", (IPC,), "got = str(bait['shared']) in [word for line in text('/proc/sysvipc/shm', 1 << 20).splitlines() for word in line.split()]"),
     Attack("reads the worker's environment in its own", (ENVIRONMENT,), "got = bait['secret'] in str(os.environ)"),
     Attack("reads the worker's environment in that of the first process", (ENVIRONMENT,), "got = bait['secret'] in text('/proc/1/environ', 1 << 16)"),
+    Attack("reads the load of the host", (FILES,), "got = text('/proc/loadavg')"),
+    Attack("reads how busy processors, memory and disks of the host are", (FILES,), """
+for name in ('stat', 'uptime', 'meminfo', 'vmstat', 'zoneinfo', 'diskstats', 'interrupts', 'softirqs', 'schedstat', 'pressure/cpu'):
+    try: got = text('/proc/' + name) or got
+    except OSError: pass
+if not got: raise OSError('none of them can be read')
+"""),
     Attack("reads the name of the host", (FILES,), "got = socket.gethostname() == bait['host']"),
     Attack("locks a file that others see", (SECCOMP,), """
 import fcntl

@@ -35,7 +35,7 @@ from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.queue import StaleLeaseError
 from dubins_traffic.service.receiving import UnknownError
-from dubins_traffic.service.service import Service, ServiceSettings
+from dubins_traffic.service.service import NoKeyError, Service, ServiceSettings
 from dubins_traffic.service.storage import StorageError
 from dubins_traffic.service.submissions import RefusedError
 from dubins_traffic.service.texts import templates
@@ -108,6 +108,7 @@ WITHOUT_SESSION = [*(f"^{path}" for path in PROGRAMS), "^/static/"]
 GUESSES = ("/login", "/join", "/reset", "/team/password", "/team/remove")
 """Where a password or a code is tried."""
 STATUS = {
+    NoKeyError: 503,
     WrongEntryError: 400,
     UnknownError: 404,
     RefusedError: 409,

@@ -356,6 +356,7 @@ def _shown(service: Service, viewer: Viewer, **secret: Any) -> Template:
         teams = {team.id: team.name for team in session.scalars(select(Team))}
         workers = accounts.worker_tokens(session)
         invitations = accounts.invitations(session, service.clock())
+        unjudged = [f"{row.competition.slug}/{row.name}" for row in service.waiting_for_key(session)]
     given = {"code": "", "token": "", "reset": "", **secret}
     return page(
         service,
@@ -367,6 +368,8 @@ def _shown(service: Service, viewer: Viewer, **secret: Any) -> Template:
         teams=teams,
         workers=workers,
         invitations=invitations,
+        unjudged=unjudged,
+        key_file=service.key_file,
         url=service.settings.url,
         **given,
     )

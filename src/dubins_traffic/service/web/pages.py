@@ -16,6 +16,7 @@ from sqlalchemy import select
 from sqlalchemy.orm import Session
 
 from dubins_traffic.competition import sealing
+from dubins_traffic.competition.competition import WALL_S
 from dubins_traffic.service import (
     accounts,
     comparing,
@@ -149,8 +150,9 @@ class Pages(Controller):
             "slug": slug,
             "competition": title,
         }
+        largest = service.settings.largest_upload
         return page(
-            service, viewer, "phase", f"{title}: {name}", largest=service.settings.largest_upload, **given
+            service, viewer, "phase", f"{title}: {name}", largest=largest, wall_bounds=WALL_S, **given
         )
 
     @get("/c/{slug:str}/{name:str}/table", sync_to_thread=True)

@@ -35,7 +35,7 @@ class AskedFor(msgspec.Struct, forbid_unknown_fields=True):
 
 
 class Leased(msgspec.Struct):
-    """Work on lease. `seeds` are those of the trials `numbers`, by number."""
+    """Work on lease; the seed of each trial is asked for when it is run."""
 
     chunk: int
     token: int
@@ -45,13 +45,18 @@ class Leased(msgspec.Struct):
     digest: str
     phase: str
     competition: dict[str, Any]
-    seeds: dict[str, int]
 
 
 class Held(msgspec.Struct, forbid_unknown_fields=True):
     """The fencing token of a lease."""
 
     token: Whole
+
+
+class SeedOf(msgspec.Struct):
+    """The seed of one trial; as text, since it may be too large for a number of JSON."""
+
+    seed: str
 
 
 class Released(msgspec.Struct, forbid_unknown_fields=True):
@@ -126,6 +131,17 @@ class WorkerApi(Controller):
 
         service.database.patiently(renew)
 
+    @post("/chunks/{number:int}/trials/{trial:int}/seed", sync_to_thread=True, status_code=HTTP_200_OK)
+    def seed(
+        self, service: ServiceHere, number: FromPath[int], trial: FromPath[int], data: JSONBody[Held]
+    ) -> SeedOf:
+        """Return the seed of a trial on lease, which is about to be run."""
+        with service.database.reading() as session:
+            chunk = queue.held(session, number, data.token)
+            if trial not in chunk.numbers:
+                raise NotFoundException("no trial of this lease")
+            return SeedOf(str(service.seeds(chunk.submission.phase)[trial]))
+
     @put("/chunks/{number:int}/replays", status_code=HTTP_200_OK, opt={requests.FILES: True})
     async def replay(
         self,
@@ -182,13 +198,13 @@ def _note(chunk: Chunk, why: str) -> str:
 
 def _lease(service: Service, session: Session, name: str) -> Leased | None:
     at = service.clock()
-    chunk = queue.take(session, name, at, service.settings.lease)
+    unjudged = [row.id for row in service.waiting_for_key(session)]
+    chunk = queue.take(session, name, at, service.settings.lease, unjudged)
     _seen(session, name, at, "" if chunk is None else _busy(chunk))
     if chunk is None:
         return None
     submission = chunk.submission
     submissions.taken(submission, chunk, at)
-    seeds = service.seeds(submission.phase) if chunk.numbers else ()
     return Leased(
         chunk=chunk.id,
         token=chunk.token,
@@ -198,7 +214,6 @@ def _lease(service: Service, session: Session, name: str) -> Leased | None:
         digest=submission.digest,
         phase=submission.phase.name,
         competition=dict(service.competition(submission.phase.competition).document),
-        seeds={str(number): seeds[number] for number in chunk.numbers},
     )
 
 
