@@ -71,7 +71,10 @@ SEARCHES: Final = {
     "rules": Wanted(
         "rules", WAITING, BLOCKED, "`rules` between two free cars on a ring of four bends, trials of 240 s"
     ),
-    "lanes": Wanted("lanes+shield", WAITING, BLOCKED, "`lanes+shield`, the same"),
+    "lanes": Wanted(
+        "lanes+shield", WAITING, BLOCKED, "`lanes+shield`, which waits for more than the rules ask, the same",
+        bar=False,
+    ),
     "egos": Wanted(
         "experiments.free_egos:Free", PROVOKING, PROVOKED,
         "any program under the shield among four lawful cars, trials of 120 s",
@@ -80,7 +83,7 @@ SEARCHES: Final = {
         "rules", AMONG_FREE, PROVOKED, "`rules` among two free cars and a lawful one, trials of 120 s", bar=False
     ),
 }  # fmt: skip
-"""The searches by name. The last one measures what the norm does not claim: lawful cars among free ones."""
+"""The searches by name. Two measure what is not claimed: `lanes`, and lawful cars among free ones."""
 HAPPENS: Final = {
     BLOCKED: "without a visit for longer than may be, though nobody has broken a rule",
     PROVOKED: "a lawful car is the first to break a rule",
