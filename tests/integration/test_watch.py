@@ -355,6 +355,7 @@ def test_a_record_is_shown_as_it_is_and_as_it_grows(tmp_path: Path) -> None:
     [
         (["watch", "no.mcap", "--no-browser"], "no.mcap"),
         (["watch", "cut.mcap", "--no-browser"], "cut.mcap"),
+        (["watch", "passwd", "--no-browser"], "passwd: of no known kind"),
         (["play", "nowhere", "--no-browser"], "nowhere"),
         (["play", "-o", "x.txt", "--no-browser"], "x.txt: "),
         (["watch", "demo", "--jobs", "2", "--no-browser"], "--jobs: trials are watched one at a time"),
@@ -367,6 +368,7 @@ def test_a_record_is_shown_as_it_is_and_as_it_grows(tmp_path: Path) -> None:
 )
 def test_wrong_input_is_a_line_and_status_2(words: list[str], told: str, tmp_path: Path) -> None:
     (tmp_path / "cut.mcap").write_bytes(b"\x89MCAP0\r\n" + b"\0" * 20)
+    (tmp_path / "passwd").write_text("root:x:0:0:root:/root:/bin/sh\n")
     (tmp_path / "empty").mkdir()
     # With neither a display nor a path to programs no browser is found.
     alone = {k: v for k, v in os.environ.items() if k not in ("DISPLAY", "WAYLAND_DISPLAY", "BROWSER")}
@@ -377,7 +379,7 @@ def test_wrong_input_is_a_line_and_status_2(words: list[str], told: str, tmp_pat
     assert done.returncode == 2, done.stderr
     assert told in done.stderr
     assert "Traceback" not in done.stderr
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["cut.mcap", "empty"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["cut.mcap", "empty", "passwd"]
 
 
 def test_a_port_that_is_taken_is_wrong_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

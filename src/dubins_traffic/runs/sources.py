@@ -26,6 +26,8 @@ from dubins_traffic.roads.formats import registry as formats
 from dubins_traffic.roads.formats.registry import MapFormat
 from dubins_traffic.roads.network import RoadNetwork
 
+KINDS = "a road network, a trials configuration, a problem instance or a record"
+
 
 def load(
     source: str | os.PathLike[str],
@@ -100,6 +102,8 @@ def _load(
         return RoadNetwork.from_text(found.text, found.name, map_format)
     if formats.is_map(found.text):
         return RoadNetwork.from_text(found.text, found.name)
+    if found.text.strip() and not found.text.lstrip().startswith(("{", "[")):
+        raise InputError("of no known kind", file=found.name, value=found.text[:20], expected=KINDS)
     document = parse_json(found.text, found.name)
     try:
         kind = detect(document, found.name)
@@ -118,7 +122,7 @@ def _load(
             raise InputError(
                 f"holds {kind}",
                 file=found.name,
-                expected="a road network, a trials configuration, a problem instance or a record",
+                expected=KINDS,
             )
 
 

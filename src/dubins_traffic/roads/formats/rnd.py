@@ -377,9 +377,10 @@ class RndText:
 
 
 def may_be(text: str) -> bool:
-    """Tell whether a text looks like plain text of RND, whatever its first key: ``key: value`` lines."""
+    """Tell whether a text looks like plain text of RND, whatever its first key: lines ``key: value``, and a field."""
     bare = _first(text)
-    return bare[:1] not in ("", "{", "[", '"') and ":" in bare
+    keys = {line.partition(":")[0].strip() for line in text.splitlines() if ":" in line}
+    return bare[:1] not in ("", "{", "[", '"') and ":" in bare and not keys.isdisjoint(FIELDS)
 
 
 def _first(text: str) -> str:
