@@ -104,3 +104,4 @@ def test_without_a_terminal_a_key_file_is_asked_for(tmp_path: Path, given: str) 
     done = subprocess.run([*command, "--key-file", str(key)], capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "sealed" / "test.json").exists()
+    assert "who loses the key, or the passphrase, has no results" in done.stderr

@@ -91,8 +91,9 @@ def seal(
     if key_file is not None and not Path(key_file).exists():
         make_key_file(Path(key_file), own.folder)
         faults.tell(f"{key_file}: a new key")
+    key = _key(own, key_file, confirm=True)
     faults.tell("who loses the key, or the passphrase, has no results: keep a copy elsewhere")
-    commitment = sealing.seal(own, _key(own, key_file, confirm=True), overwrite=overwrite)
+    commitment = sealing.seal(own, key, overwrite=overwrite)
     options.tell(str(sealing.sealed_path(own)))
     print(f"commitment {commitment}")
 

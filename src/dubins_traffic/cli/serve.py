@@ -75,13 +75,13 @@ def serve(
     key = default_key(place) if key_file is None else Path(key_file)
     known = key.exists()
     service = Service(place, key)
+    opened = listening.listen(host, port)
+    url = listening.address_of(opened)
+    joining = serving.prepare(service, [Path(path) for path in competition or ()], url)
     if not known and key.exists():
         faults.tell(f"{key}: a new key; who loses it has no results: keep a copy elsewhere")
     elif not known:
         faults.tell(f"{key}: no such key; phases with secrets are not judged until it is there")
-    opened = listening.listen(host, port)
-    url = listening.address_of(opened)
-    joining = serving.prepare(service, [Path(path) for path in competition or ()], url)
     print(f"Serving {folder} at {service.settings.url or url}", flush=True)
     if service.settings.url:
         print(f"The proxy finds it at {url}", flush=True)
