@@ -9,25 +9,15 @@ from __future__ import annotations
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
-from dubins_traffic.policies.rules.seeing import is_by_disc_behind, kept_beside, way_to_go
-from dubins_traffic.policies.rules.tables import Traffic, Vehicle
+from dubins_traffic.policies.rules.seeing import EARLY, is_by_disc_behind, kept_beside, leans, way_to_go
+from dubins_traffic.policies.rules.tables import Traffic
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_lane, on_way
-from dubins_traffic.policies.safety import GUARD, travel_of
 from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.rules.shape import half_across
 
 BESIDE_LINE = 1.5
 """So near to the disc at the end of its lane, metres, a car leans past an ego alone. Farther back it leans past whoever
 is beside it, and has room to turn straight again."""
-EARLY = 0.8
-"""A car leans from this gap to a body on, metres: beside it a rectangle would have no room to turn."""
-
-
-@jit_inline
-def leans(vehicle: Vehicle) -> bool:
-    """Tell whether a car in the middle of its lane can't pass one that reaches over the line as far as it may."""
-    beside = vehicle.middle - vehicle.half_width - vehicle.rounding - vehicle.over
-    return beside < travel_of(vehicle) + GUARD
 
 
 @jit_inline

@@ -45,6 +45,8 @@ HELD = 1e9
 ABRUPT, ASTRAY = 0.8, 0.18
 """Sine of the angle at which a car returns to its way that is astray in a disc, having chosen another exit late, and
 how far left of it such a car is, metres."""
+EARLY = 0.8
+"""A car leans from this gap to a body on, metres: beside it a rectangle would have no room to turn."""
 AWARE = 0.06
 """A car takes note of bodies up to this much farther away than the gap it keeps, metres."""
 
@@ -73,8 +75,10 @@ def meets_nobody(
     b: int, n: int, part: int, key: float, left: float, x: float, y: float, way: ReferencePath, state: State,
     vehicle: Vehicle,
 ) -> bool:  # fmt: skip
-    """Tell whether no car of the trial is close to a car that just drives on, or ahead on its way."""
+    """Tell whether no car of the trial is close to a car that just drives on, or ahead on its way, and no ego near."""
     far, touch = alone(vehicle), 2.0 * vehicle.reach + vehicle.near
+    if leans(vehicle):
+        touch = max(touch, 2.0 * vehicle.reach + EARLY)
     low, high = corridor(left, 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE)
     for j in range(state.count[b]):
         dx = state.x[b, j] - x
@@ -82,6 +86,8 @@ def meets_nobody(
         d2 = dx * dx + dy * dy
         if d2 > far * far or j == n:
             continue
+        if j == EGO:
+            return False
         there, its_key, its_left, _, _ = on_way(way, state.x[b, j], state.y[b, j])
         behind = there < part or (there == part and its_key <= key)
         if d2 < touch * touch or not (behind or its_left < low or its_left > high):
@@ -212,6 +218,13 @@ def leans_past(b: int, left: float, px: float, py: float, car: Driver, traffic: 
         left - half_across(b, EGO, px, py, traffic.state, vehicle) - kept_beside(vehicle)
         >= EDGE - vehicle.middle
     )
+
+
+@jit_inline
+def leans(vehicle: Vehicle) -> bool:
+    """Tell whether a car in the middle of its lane can't pass one that reaches over the line as far as it may."""
+    beside = vehicle.middle - vehicle.half_width - vehicle.rounding - vehicle.over
+    return beside < travel_of(vehicle) + GUARD
 
 
 @jit_inline
