@@ -235,7 +235,7 @@ class TransportConformance:
             ends = [result.ending.end for result in run_remote(Session(link, instances.__getitem__, 3))]
             future.result(timeout=600)
             peer.hang_up()
-        assert ends == [End.DEADLINE, End.DURATION, End.DURATION]
+        assert ends == [End.DEADLINE, End.DURATION, End.DURATION], ends
 
 
 def answer(
