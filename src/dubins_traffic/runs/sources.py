@@ -102,7 +102,7 @@ def _load(
         return RoadNetwork.from_text(found.text, found.name, map_format)
     if formats.is_map(found.text):
         return RoadNetwork.from_text(found.text, found.name)
-    if found.text.strip() and not found.text.lstrip().startswith(("{", "[")):
+    if found.text.lstrip()[:1] not in ("", "{", "["):
         raise InputError("of no known kind", file=found.name, value=found.text[:20], expected=KINDS)
     document = parse_json(found.text, found.name)
     try:

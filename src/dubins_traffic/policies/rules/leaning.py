@@ -9,7 +9,7 @@ from __future__ import annotations
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
-from dubins_traffic.policies.rules.seeing import EARLY, is_by_disc_behind, kept_beside, leans, way_to_go
+from dubins_traffic.policies.rules.seeing import is_by_disc_behind, kept_beside, leans, leans_from, way_to_go
 from dubins_traffic.policies.rules.tables import Traffic
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_lane, on_way
 from dubins_traffic.roads.lookup import lane_end, lane_start
@@ -36,7 +36,7 @@ def lean(b: int, n: int, offset: float, part: int, way: ReferencePath, near: int
 @jit_inline
 def is_by_ego(b: int, n: int, traffic: Traffic) -> bool:
     """Tell whether the ego is near an e-agent and in a disc, where no centre line keeps it from reaching far over."""
-    state, far = traffic.state, 2.0 * traffic.drivers.vehicle[b].reach + EARLY
+    state, far = traffic.state, leans_from(traffic.drivers.vehicle[b])
     dx, dy = state.x[b, EGO] - state.x[b, n], state.y[b, EGO] - state.y[b, n]
     return n != EGO and traffic.labels.lane[b, EGO] < 0 and dx * dx + dy * dy <= far * far
 
@@ -74,8 +74,7 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
     centre stays on the road. `near` (count) cars are listed.
     """
     state, scratch, vehicle = traffic.state, traffic.scratch, traffic.drivers.vehicle[b]
-    clear = kept_beside(vehicle)
-    far = 2.0 * vehicle.reach + EARLY
+    clear, far = kept_beside(vehicle), leans_from(vehicle)
     offset = 0.0
     for k in range(near):
         j = scratch.near[k]

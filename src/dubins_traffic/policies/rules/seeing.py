@@ -78,7 +78,7 @@ def meets_nobody(
     """Tell whether no car of the trial is close to a car that just drives on, or ahead on its way, and no ego near."""
     far, touch = alone(vehicle), 2.0 * vehicle.reach + vehicle.near
     if leans(vehicle):
-        touch = max(touch, 2.0 * vehicle.reach + EARLY)
+        touch = max(touch, leans_from(vehicle))
     low, high = corridor(left, 2.0 * (vehicle.half_width + vehicle.rounding) + SIDE)
     for j in range(state.count[b]):
         dx = state.x[b, j] - x
@@ -225,6 +225,12 @@ def leans(vehicle: Vehicle) -> bool:
     """Tell whether a car in the middle of its lane can't pass one that reaches over the line as far as it may."""
     beside = vehicle.middle - vehicle.half_width - vehicle.rounding - vehicle.over
     return beside < travel_of(vehicle) + GUARD
+
+
+@jit_inline
+def leans_from(vehicle: Vehicle) -> float:
+    """Return the distance of centres, metres, from which on a car leans past a body."""
+    return 2.0 * vehicle.reach + EARLY
 
 
 @jit_inline

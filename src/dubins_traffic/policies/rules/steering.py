@@ -86,7 +86,7 @@ def move(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
         )
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
-    elif not safe and passes and within_lane(drivers.car[b, n].aside, vehicle):
+    elif not safe and (steep == ABRUPT or (passes and within_lane(drivers.car[b, n].aside, vehicle))):
         across = 1.0 if left > offset else -1.0
         speed, yaw_rate = steer(
             c, s, across, px, py, bend, allowed, NIMBLE, aligned, limit, vehicle.tightest, vehicle.period
@@ -105,7 +105,10 @@ def move(
 def goes_on(
     b: int, n: int, speed: float, outside: bool, way: ReferencePath, near: int, traffic: Traffic
 ) -> bool:
-    """Tell whether an e-agent beside which another car is as close as may be can drive straight on past it."""
+    """Tell whether an e-agent beside which another car is as close as may be can drive straight on past it.
+
+    The cars that it slides past are taken off the list of those near, which nobody reads any more in this tick.
+    """
     state, vehicle, scratch = traffic.state, traffic.drivers.vehicle[b], traffic.scratch
     pose, beside = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]), 0
     for k in range(near):

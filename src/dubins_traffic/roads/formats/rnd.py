@@ -379,8 +379,9 @@ class RndText:
 def may_be(text: str) -> bool:
     """Tell whether a text looks like plain text of RND, whatever its first key: lines ``key: value``, and a field."""
     bare = _first(text)
-    keys = {line.partition(":")[0].strip() for line in text.splitlines() if ":" in line}
-    return bare[:1] not in ("", "{", "[", '"') and ":" in bare and not keys.isdisjoint(FIELDS)
+    if bare[:1] in ("", "{", "[", '"') or ":" not in bare:
+        return False
+    return any(line.partition(":")[0].strip() in FIELDS for line in text.splitlines() if ":" in line)
 
 
 def _first(text: str) -> str:
