@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import subprocess
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -13,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.table import Row, machine
+from tests.architecture.buildings import CORE, town
 
 from dubins_traffic.files import write_text
 from dubins_traffic.release import PACKAGE
@@ -29,9 +29,7 @@ def code(*files: Path) -> str:
     transport has changed since.
     """
     digest = hashlib.sha256()
-    town = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["importlinter"]
-    buildings = next(own for own in town["contracts"] if "core" in own)
-    rooms = [PACKAGE / room.replace(".", "/") for line in buildings["core"] for room in line.split(" | ")]
+    rooms = [PACKAGE / room for room in town().rooms(CORE)]
     folders = [*rooms, PACKAGE / "falsification"]
     for path in sorted(
         path for folder in folders for path in (*folder.rglob("*.py"), folder.with_suffix(".py"))

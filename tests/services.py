@@ -235,6 +235,18 @@ def serving(
         assert "Traceback" not in said or not clean, said[-5000:]
 
 
+@contextmanager
+def season(
+    folder: Path, *, judged: bool = True, settings: str = "logins = 10000\n", clean: bool = False
+) -> Iterator[Service]:
+    """Run the service of a short competition below a folder; `judged`: by workers that trust submissions."""
+    (folder / "short.toml").write_text(competition_text())
+    how = ("--trust-submissions",) if judged else ("--workers", "0")
+    competition = ("--competition", str(folder / "short.toml"))
+    with serving(folder / "here", *how, *competition, settings=settings, clean=clean) as service:
+        yield service
+
+
 def answers(url: str) -> bool:
     """Tell whether a service answers."""
     try:

@@ -6,16 +6,13 @@ from collections.abc import Iterator
 
 import pytest
 
-from tests.services import CRASHING, STANDING, Service, competition_text, serving, wait_until
+from tests.services import CRASHING, STANDING, Service, season, wait_until
 
 
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     folder = tmp_path_factory.mktemp("service")
-    (folder / "short.toml").write_text(competition_text())
-    with serving(
-        folder / "here", "--competition", str(folder / "short.toml"), "--trust-submissions", clean=True
-    ) as running:
+    with season(folder, clean=True) as running:
         yield running
 
 

@@ -19,8 +19,7 @@ from tests.services import (
     STANDING,
     Person,
     Service,
-    competition_text,
-    serving,
+    season,
     shown_secret,
 )
 
@@ -30,9 +29,7 @@ EXAMPLES = 6
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     folder = tmp_path_factory.mktemp("api")
-    (folder / "short.toml").write_text(competition_text())
-    arguments = ("--competition", str(folder / "short.toml"), "--trust-submissions")
-    with serving(folder / "here", *arguments, settings="logins = 10000\n", clean=True) as running:
+    with season(folder, clean=True) as running:
         yield running
 
 
@@ -141,9 +138,7 @@ def test_other_test_seeds_change_nothing_that_a_participant_sees(tmp_path: Path)
     for name in ("one", "other"):
         folder = tmp_path / name
         folder.mkdir()
-        (folder / "short.toml").write_text(competition_text())
-        arguments = ("--competition", str(folder / "short.toml"), "--trust-submissions")
-        with serving(folder / "here", *arguments, settings="logins = 10000\n") as service:
+        with season(folder) as service:
             organiser = service.organiser()
             person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
             numbers = [person.submit("short/test", text) for text in (STANDING, CRASHING)]

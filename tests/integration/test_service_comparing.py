@@ -16,8 +16,7 @@ from tests.services import (
     STANDING,
     Person,
     Service,
-    competition_text,
-    serving,
+    season,
     shown_secret,
     wait_until,
 )
@@ -39,9 +38,7 @@ class World:
 @pytest.fixture(scope="module")
 def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
     folder = tmp_path_factory.mktemp("comparing")
-    (folder / "short.toml").write_text(competition_text())
-    arguments = ("--competition", str(folder / "short.toml"), "--trust-submissions")
-    with serving(folder / "here", *arguments, settings="logins = 10000\n", clean=True) as service:
+    with season(folder, clean=True) as service:
         organiser = service.organiser()
         ants = service.person().join(organiser.invite(), "Ann", "Ants")
         bees = service.person().join(organiser.invite(), "Bea", "Bees")

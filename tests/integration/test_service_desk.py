@@ -11,7 +11,7 @@ from xml.etree import ElementTree
 
 import pytest
 
-from tests.services import CRASHING, STANDING, Person, Service, competition_text, serving, wait_until
+from tests.services import CRASHING, STANDING, Person, Service, competition_text, season, serving, wait_until
 
 ATOM = "{http://www.w3.org/2005/Atom}"
 DESK, EDIT = "/desk/c/short", "/desk/edit/short"
@@ -20,9 +20,7 @@ DESK, EDIT = "/desk/c/short", "/desk/edit/short"
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     folder = tmp_path_factory.mktemp("desk")
-    (folder / "short.toml").write_text(competition_text())
-    arguments = ("--competition", str(folder / "short.toml"), "--trust-submissions")
-    with serving(folder / "here", *arguments, settings="logins = 10000\n", clean=True) as running:
+    with season(folder, clean=True) as running:
         yield running
 
 

@@ -10,7 +10,7 @@ from contextlib import closing, suppress
 import httpx
 import pytest
 
-from tests.services import PASSWORD, STANDING, Person, Service, competition_text, serving, wait_until
+from tests.services import PASSWORD, STANDING, Person, Service, season, wait_until
 
 LARGE = 32 << 20
 SENDERS = 4
@@ -19,9 +19,7 @@ SENDERS = 4
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     folder = tmp_path_factory.mktemp("doors")
-    (folder / "short.toml").write_text(competition_text())
-    arguments = ("--workers", "0", "--competition", str(folder / "short.toml"))
-    with serving(folder / "here", *arguments, settings="logins = 10000\n", clean=True) as running:
+    with season(folder, judged=False, clean=True) as running:
         yield running
 
 

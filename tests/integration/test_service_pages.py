@@ -14,7 +14,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
 from tests.browser import WAIT_S, browsing, dark, faults, fill, login
-from tests.services import CIRCLING, CRASHING, PASSWORD, STANDING, Service, competition_text, serving
+from tests.services import CIRCLING, CRASHING, PASSWORD, STANDING, Service, competition_text, season
 
 pytestmark = pytest.mark.tools("browser")
 
@@ -25,9 +25,7 @@ PHONE, DESKTOP = (390, 844), (1280, 900)
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     folder = tmp_path_factory.mktemp("pages")
-    (folder / "short.toml").write_text(competition_text())
-    arguments = ("--competition", str(folder / "short.toml"), "--trust-submissions")
-    with serving(folder / "here", *arguments, settings="logins = 10000\n") as running:
+    with season(folder) as running:
         yield running
 
 

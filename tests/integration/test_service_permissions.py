@@ -12,7 +12,7 @@ import pytest
 
 from dubins_traffic.service.service import Service as StoredService
 from dubins_traffic.service.web.app import create_app
-from tests.services import STANDING, Person, Service, competition_text, serving, shown_secret
+from tests.services import STANDING, Person, Service, season, shown_secret
 
 NOBODY, OTHER, TEAM, ORGANISER, WORKER = "nobody", "other team", "team", "organiser", "worker"
 ROLES = (NOBODY, OTHER, TEAM, ORGANISER, WORKER)
@@ -140,9 +140,7 @@ class World:
 @pytest.fixture(scope="module")
 def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
     folder = tmp_path_factory.mktemp("permissions")
-    (folder / "short.toml").write_text(competition_text())
-    arguments = ("--workers", "0", "--competition", str(folder / "short.toml"))
-    with serving(folder / "here", *arguments, settings="logins = 10000\n", clean=True) as service:
+    with season(folder, judged=False, clean=True) as service:
         organiser = service.organiser().with_token()
         team = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
         other = service.person().join(organiser.invite(), "Bob", "Bees").with_token()

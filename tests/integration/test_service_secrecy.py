@@ -27,7 +27,7 @@ from dubins_traffic.service.hiding import HiddenError
 from dubins_traffic.service.service import NoKeyError
 from dubins_traffic.service.service import Service as StoredService
 from tests import postgres
-from tests.services import CRASHING, Person, competition_text, serving, wait_until
+from tests.services import CRASHING, Person, season, wait_until
 
 pytestmark = pytest.mark.tools
 
@@ -149,9 +149,7 @@ def test_a_number_is_found_in_a_member_of_an_archive(tmp_path: Path, order: str)
 def a_season(tmp_path: Path, settings: str, also: list[Path]) -> None:
     """Judge two submissions in phases that hide their trials, and look at every byte until these may be seen."""
     folder = tmp_path / "here"
-    (tmp_path / "short.toml").write_text(competition_text())
-    arguments = ("--trust-submissions", "--competition", str(tmp_path / "short.toml"))
-    with serving(folder, *arguments, settings=f"logins = 10000\n{settings}") as service:
+    with season(tmp_path, settings=f"logins = 10000\n{settings}") as service:
         organiser = service.organiser().with_token()
         person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
         seeds = seeds_of(folder)

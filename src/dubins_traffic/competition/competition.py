@@ -31,9 +31,16 @@ MOST_TRIALS = 100_000
 """Most trials of a phase, all configurations together."""
 SECRET = "secret"
 """In place of a seed: the seeds are drawn by `dubins-traffic competition seal`, and nobody knows them."""
+RUN_TWICE = 20
+"""A service runs one trial of a submission in so many a second time, and one at least."""
 WALL_S = (30.0, 120.0)
 """Least and most of twice the duration of a trial, which is its limit of wall-clock time unless a phase sets one."""
 UTC_TIME = "a time in UTC, as 2027-03-01T12:00:00Z"
+
+
+def run_twice(trials: int) -> int:
+    """Return how many trials of a submission a service runs a second time, to see whether they come out the same."""
+    return max(1, trials // RUN_TWICE)
 
 
 def _time(value: object) -> datetime:

@@ -10,14 +10,11 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from dubins_traffic.competition.competition import Competition, Phase
+from dubins_traffic.competition.competition import Competition, Phase, run_twice
 from dubins_traffic.competition.judging import evaluate
 from dubins_traffic.competition.submission import check_submission
 from dubins_traffic.competition.templates import built_in
 from dubins_traffic.problem import limits
-
-AGAIN = 20
-"""A service runs one trial of a submission in so many a second time, and one at least."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +35,7 @@ class Rehearsed:
         total = self.phase.quota.total
         count = submissions if total is None else min(submissions, total)
         trials = len(self.phase.numbers)
-        return count * (trials + max(1, trials // AGAIN)) * self.seconds
+        return count * (trials + run_twice(trials)) * self.seconds
 
 
 def rehearse(

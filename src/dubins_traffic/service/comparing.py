@@ -9,6 +9,7 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.competition.ranking import value
 from dubins_traffic.service import receiving, submissions, viewing
+from dubins_traffic.service.database import numbered
 from dubins_traffic.service.database_tables import Account, Chunk, Phase, Submission, Trial, Worker
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service
@@ -33,7 +34,6 @@ def _shown(submission: Submission, trial: Trial, metric: str) -> dict[str, Any]:
         "run": submission.run,
         "number": trial.number,
         "end": trial.end,
-        "metric": metric,
         "value": value(trial.row, metric),
         "map": trial.replay is not None,
     }
@@ -65,7 +65,7 @@ def beside(
     UnknownError if somebody may not see the trials of both.
     """
     at, pair = service.clock(), [receiving.submission_numbered(session, number, account)]
-    rival = session.get(Submission, other) if other < 1 << 31 else None
+    rival = numbered(session, Submission, other)
     if rival is None or rival.phase_id != pair[0].phase_id:
         raise UnknownError("no such submission to this phase")
     pair.append(rival)

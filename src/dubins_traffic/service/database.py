@@ -32,6 +32,8 @@ PATIENCE_S = 60.0
 LONGEST_PAUSE_S = 0.5
 """How long a writer waits at most until it tries again: well under the shortest lease of use."""
 Found = TypeVar("Found")
+LARGEST_NUMBER = (1 << 31) - 1
+"""The largest number that a column of numbers holds."""
 
 
 class Database:
@@ -109,6 +111,11 @@ class Database:
     def close(self) -> None:
         """Close all connections."""
         self.engine.dispose()
+
+
+def numbered(session: Session, table: type[Found], number: int) -> Found | None:
+    """Return the row of a table that has a number, whatever number was asked for; None if there is none."""
+    return session.get(table, number) if number <= LARGEST_NUMBER else None
 
 
 def _check_known(connection: Connection, known: ScriptDirectory) -> None:

@@ -24,6 +24,7 @@ from dubins_traffic.competition.templates import built_in
 from dubins_traffic.errors import DubinsTrafficError, InputError, shown
 from dubins_traffic.service import receiving, standings, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError, make_team, note
+from dubins_traffic.service.database import numbered
 from dubins_traffic.service.database_tables import (
     Account,
     Announcement,
@@ -218,7 +219,7 @@ def announce(
 
 def retract(service: Service, session: Session, number: int, by: Account) -> str:
     """Take an announcement back, and return the address of its competition; WrongEntryError if there is none."""
-    row = session.get(Announcement, number) if number < 1 << 31 else None
+    row = numbered(session, Announcement, number)
     if row is None:
         raise WrongEntryError("no such announcement")
     session.delete(row)

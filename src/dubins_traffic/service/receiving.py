@@ -10,6 +10,7 @@ from sqlalchemy.orm import Session
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service import submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database import numbered
 from dubins_traffic.service.database_tables import Account, Competition, Phase, Submission
 from dubins_traffic.service.service import Service, competition_of, phase_of
 from dubins_traffic.service.submissions import RefusedError, Upload
@@ -37,7 +38,7 @@ def phase_named(session: Session, slug: str, name: str) -> Phase:
 
 def submission_numbered(session: Session, number: int, account: Account | None) -> Submission:
     """Return a submission of somebody's team; UnknownError if there is none, or it is another team's."""
-    submission = session.get(Submission, number) if number < 1 << 31 else None
+    submission = numbered(session, Submission, number)
     if submission is None or not viewing.owns(account, submission):
         raise UnknownError("no such submission")
     return submission

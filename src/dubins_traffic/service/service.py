@@ -180,16 +180,23 @@ class Service:
             )
         return self._read_key
 
-    def waits_for_key(self, row: Phase) -> bool:
-        """Tell whether a phase is not judged because the key is not there."""
+    def has_key(self) -> bool:
+        """Tell whether what unlocks secret seeds is there."""
         try:
             self.needed_key()
         except NoKeyError:
-            return row.shows != "all" or (row.commitment is not None and row.revealed is None)
-        return False
+            return False
+        return True
+
+    def waits_for_key(self, row: Phase) -> bool:
+        """Tell whether a phase is not judged because the key is not there."""
+        secret = row.shows != "all" or (row.commitment is not None and row.revealed is None)
+        return secret and not self.has_key()
 
     def waiting_for_key(self, session: Session) -> list[Phase]:
         """Return the phases that are not judged because the key is not there."""
+        if self.has_key():
+            return []
         rows = session.scalars(select(Phase).options(joinedload(Phase.competition)).order_by(Phase.id))
         return [row for row in rows.all() if self.waits_for_key(row)]
 

@@ -11,7 +11,7 @@ from typing import Any
 from sqlalchemy import func, select, update
 from sqlalchemy.orm import Session, defer, undefer
 
-from dubins_traffic.competition.competition import Quota
+from dubins_traffic.competition.competition import Quota, run_twice
 from dubins_traffic.errors import DubinsTrafficError, shown
 from dubins_traffic.service import queue
 from dubins_traffic.service.database_tables import Account, Chunk, Phase, Submission, Trial
@@ -24,8 +24,6 @@ ACTIVE = tuple(DEADLINES)
 OURS, THEIRS = "platform", "submission"
 CHUNK = 10
 """Trials in a unit of work."""
-SAMPLE = 20
-"""One trial in so many is run twice, and one at least."""
 MOST_UPLOADS = 200
 """Uploads of a team in an hour, rejected ones too: each costs us a check."""
 MOST_BYTES = 512 << 20
@@ -194,7 +192,7 @@ def in_chunks(numbers: Sequence[int]) -> list[list[int]]:
 
 def sample(numbers: Sequence[int]) -> list[int]:
     """Return which trials of a submission are run twice: by chance, so that nobody can know it before."""
-    return sorted(secrets.SystemRandom().sample(list(numbers), max(1, len(numbers) // SAMPLE)))
+    return sorted(secrets.SystemRandom().sample(list(numbers), run_twice(len(numbers))))
 
 
 def reject(session: Session, submission: Submission, reason: str, at: float) -> None:

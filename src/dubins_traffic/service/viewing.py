@@ -83,7 +83,7 @@ def latest_places(
     if not sees_table(row, account, service.clock()) or service.waits_for_key(row):
         return None, []
     latest = standings.latest_standing(session, row, service.hiding(row))
-    return latest and latest.at, places_in(service, row, latest, account)
+    return latest and latest.at, _places_in(service, row, latest, account)
 
 
 def past_places(
@@ -93,17 +93,16 @@ def past_places(
     if not sees_table(row, account, service.clock()):
         return [], False
     past, older = standings.history(session, row, service.hiding(row), page)
-    return [(one.at, places_in(service, row, one, account)) for one in past], older
+    return [(one.at, _places_in(service, row, one, account)) for one in past], older
 
 
-def places_in(
+def _places_in(
     service: Service, row: Phase, standing: Standing | None, account: Account | None
 ) -> list[dict[str, Any]]:
-    """Return a table of a phase as somebody may see it now: whole, rounded, or nothing of it."""
-    at = service.clock()
-    if standing is None or not sees_table(row, account, at):
+    """Return a table of a phase that somebody may see now: whole or rounded, or nothing if there is none yet."""
+    if standing is None:
         return []
-    whole = is_organiser(account) or row.is_closed(at)
+    whole = is_organiser(account) or row.is_closed(service.clock())
     return list(standing.places) if whole else standings.shown_table(service.phase(row), standing)
 
 

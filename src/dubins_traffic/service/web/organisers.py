@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,6 +16,7 @@ from sqlalchemy import select
 from dubins_traffic.controllers import registry
 from dubins_traffic.service import accounts, archive, editing, organising, queue, receiving, viewing
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database import numbered
 from dubins_traffic.service.database_tables import Account, Act, Competition, Submission, Team
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service
@@ -41,12 +43,14 @@ class Files:
     files: list[UploadFile]
 
 
-PHASE_ACTS: dict[str, Any] = {
-    "open": organising.open_phase,
-    "close": organising.close_phase,
-    "reveal": organising.reveal,
-    "reopen": organising.reopen_phase,
+PHASE_ACTS: dict[str, tuple[Callable[..., None], tuple[str, ...]]] = {
+    "open": (organising.open_phase, ()),
+    "close": (organising.close_phase, ()),
+    "reveal": (organising.reveal, ()),
+    "reopen": (organising.reopen_phase, ("until",)),
+    "baseline": (organising.add_baseline, ("controller",)),
 }
+"""What does each act on a phase, and the fields of its form that it is given."""
 FOLLOWS = {
     "open": "Teams may hand in from now on, and the commitment to secret seeds is published. A phase that has opened "
     "can be closed, but not made to open later.",
@@ -236,12 +240,12 @@ class Organisers(Controller):
         act: FromPath[str],
     ) -> Template:
         """Say what follows from an act, and ask whether it is wanted."""
-        if act not in PHASE_ACTS:
+        if act not in PHASE_ACTS or act not in FOLLOWS:
             raise UnknownError("no such act")
         with service.database.reading() as session:
             receiving.phase_named(session, slug, name)
         where, title = f"/desk/c/{slug}/{name}/{act}", f"{act.capitalize()} {name}"
-        until = "until" if act == "reopen" else ""
+        until = "until" if "until" in PHASE_ACTS[act][1] else ""
         return asked(service, viewer, where, title, FOLLOWS[act], back=f"/desk/c/{slug}", until=until)
 
     @post("/c/{slug:str}/{name:str}/{act:str}", sync_to_thread=True)
@@ -257,14 +261,10 @@ class Organisers(Controller):
         """Open, close, re-open or reveal a phase, or hand in a built-in controller."""
         with service.database.writing() as session:
             phase = receiving.phase_named(session, slug, name)
-            if act == "reopen":
-                organising.reopen_phase(service, session, phase, viewer.person, data.get("until", ""))
-            elif act == "baseline":
-                organising.add_baseline(service, session, phase, viewer.person, data.get("controller", ""))
-            elif act in PHASE_ACTS:
-                PHASE_ACTS[act](service, session, phase, viewer.person)
-            else:
+            if act not in PHASE_ACTS:
                 raise UnknownError("no such act")
+            carried_out, fields = PHASE_ACTS[act]
+            carried_out(service, session, phase, viewer.person, *(data.get(field, "") for field in fields))
         organising.publish_opened(service)
         return Redirect(f"/desk/c/{slug}", status_code=303)
 
@@ -313,7 +313,7 @@ class Organisers(Controller):
         if act not in acts:
             raise UnknownError("no such act")
         with service.database.writing() as session:
-            row = session.get(Submission, number) if number < 1 << 31 else None
+            row = numbered(session, Submission, number)
             if row is None:
                 raise UnknownError("no such submission")
             acts[act](service, session, row, viewer.person, data.get("why", ""))
@@ -343,7 +343,7 @@ def _digest(row: Competition) -> str:
 
 
 def _account(session: viewing.Session, number: int) -> Account:
-    account = session.get(Account, number) if number < 1 << 31 else None
+    account = numbered(session, Account, number)
     if account is None or account.removed is not None:
         raise UnknownError("no such account")
     return account

@@ -28,6 +28,7 @@ from dubins_traffic.service import (
     viewing,
 )
 from dubins_traffic.service.accounts import WrongEntryError
+from dubins_traffic.service.database import LARGEST_NUMBER, numbered
 from dubins_traffic.service.database_tables import (
     Account,
     Competition,
@@ -298,8 +299,8 @@ def _seen(
     service: Service, viewer: Viewer, number: int, trial: int, session: viewing.Session
 ) -> tuple[Submission, Trial]:
     """Return a trial that somebody may see now, with its submission."""
-    submission = session.get(Submission, number) if number < 1 << 31 else None
-    if submission is None or trial >= 1 << 31:
+    submission = numbered(session, Submission, number)
+    if submission is None or trial > LARGEST_NUMBER:
         raise UnknownError("no such trial")
     if not viewing.sees_trials(submission.phase, viewer.account, submission, service.clock()):
         raise UnknownError("no such trial")
@@ -480,7 +481,7 @@ class Teams(Controller):
     def revoke(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Revoke a token."""
         with service.database.writing() as session:
-            token = session.get(Token, number) if number < 1 << 31 else None
+            token = numbered(session, Token, number)
             if token is None or token.account_id != viewer.person.id:
                 raise WrongEntryError("no such token")
             token.revoked = service.clock()
@@ -516,7 +517,7 @@ class Teams(Controller):
 
 
 def _member(session: Session, viewer: Viewer, number: int) -> Account:
-    member = session.get(Account, number) if number < 1 << 31 else None
+    member = numbered(session, Account, number)
     if member is None or viewer.team is None or member.team_id != viewer.team.id:
         raise UnknownError("no such member of your team")
     return member
