@@ -19,6 +19,7 @@ from dubins_traffic.cli.commands import app
 from tests.reader import Reader
 from tests.shown import COMMAND, ROOT, Block, all_pages, blocks
 from tests.shown_pages import PAGES
+from tests.shown_pictures import assert_made
 from tests.shown_scores import require_progress, tables
 
 ALL = os.environ.get("DUBINS_TRAFFIC_PAGES") == "all"
@@ -172,6 +173,7 @@ def test_the_code_of_a_page_runs(name: str, tmp_path: Path) -> None:
                         happens(reader)
                 reader.follow(block)
         reader.wait()
+        assert_made(all_pages()[name].read_text(encoding="utf-8"), folder)
         if name.startswith(IMPROVED):
             require_progress([table for log in reader.notes.iterdir() for table in tables(log.read_text())])
     finally:

@@ -12,6 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.integration.test_readme import FILE_NAME, ROOT, runnable
+from tests.shown_pictures import assert_made
 from tests.shown_scores import Shown, require_progress, tables
 
 TUTORIALS = ROOT / "docs" / "tutorials"
@@ -52,6 +53,7 @@ def follow(name: str, folder: Path, around: Mapping[str, str] = ENVIRONMENT) -> 
     require_progress(found)
     shown = re.findall(r"`((?:\w+/)*\w+\.html)`", text(name))
     assert [page for page in shown if not (folder / page).exists()] == []
+    assert_made(text(name), folder)
 
 
 def test_every_tutorial_is_run() -> None:

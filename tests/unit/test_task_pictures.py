@@ -10,14 +10,13 @@ from pathlib import Path
 
 import matplotlib
 import pytest
-from PIL import Image
 
 from dubins_traffic.cli.main import main
 from tests.rules_scripts import Frame, flags, instance, label
+from tests.shown_pictures import PICTURES, assert_made
 
 ROOT = Path(__file__).parents[2]
 PAGE = ROOT / "docs" / "task.md"
-PICTURES = ROOT / "docs" / "pictures"
 ANY = re.compile(r"!\[[^\]]+\]\(pictures/([^)/]+)\)")
 SHOWN = re.findall(r"!\[[^\]]+\]\(pictures/([^)]+)\)", PAGE.read_text(encoding="utf-8"))
 
@@ -72,13 +71,7 @@ def test_the_trial_of_the_readme_is_what_its_commands_draw(
     ]
     assert [words[0] for words in commands] == ["run", "replay", "plot"]
     assert [main(words) for words in commands] == [0, 0, 0]
-    assert (PICTURES / "trial.gif").stat().st_size < 1_000_000
-    with Image.open(tmp_path / "trial.gif") as made, Image.open(PICTURES / "trial.gif") as kept:
-        assert made.n_frames == kept.n_frames == 301  # pyright: ignore[reportAttributeAccessIssue]
-        for number in range(0, 301, 50):
-            made.seek(number)
-            kept.seek(number)
-            assert made.convert("RGB").tobytes() == kept.convert("RGB").tobytes()
+    assert assert_made(page, tmp_path, every=50) == [301]
     assert (tmp_path / "trial.svg").read_bytes() == (PICTURES / "trial.svg").read_bytes()
 
 
