@@ -371,6 +371,26 @@ def test_goals_bear_the_numbers_of_pictures(page: webdriver.Chrome, trial: tuple
     assert told == [[str(n + 1), f"{x},{y}"] for n, (x, y) in enumerate(tried.problem.goals)]
 
 
+BAR = """
+const map = document.getElementById("map"), frame = map.getBoundingClientRect(), ratio = map.width / frame.width;
+const faint = getComputedStyle(document.documentElement).getPropertyValue("--faint").trim();
+const [red, green, blue] = [1, 3, 5].map((at) => parseInt(faint.slice(at, at + 2), 16));
+const data = map.getContext("2d").getImageData(0, 0, map.width, map.height).data;
+for (let y = map.height - 1; y > 0; y -= 1) {
+  for (let x = map.width - 1, run = 0; x >= 0; x -= 1) {
+    const k = 4 * (y * map.width + x);
+    run = data[k] === red && data[k + 1] === green && data[k + 2] === blue ? run + 1 : 0;
+    if (run >= 30 * ratio) {
+      const box = document.getElementById("toggles").getBoundingClientRect();
+      const [left, top] = [frame.left + x / ratio, frame.top + y / ratio];
+      if (left > box.right || top < box.top) return true;
+    }
+  }
+}
+return false;"""
+"""Whether 30 pixels in a row of the scale's colour, looked for from the right below, lie beside or above the toggles."""
+
+
 @pytest.mark.parametrize("width", [360, 400, 820, 1280])
 def test_fits_any_width_in_light_and_dark(page: webdriver.Chrome, width: int) -> None:
     size = {"width": width, "height": 780, "deviceScaleFactor": 2, "mobile": width < 600}
@@ -383,6 +403,7 @@ def test_fits_any_width_in_light_and_dark(page: webdriver.Chrome, width: int) ->
             "const box = document.getElementById(id); const r = box.getBoundingClientRect();"
             "return r.left >= 0 && r.right <= innerWidth && box.scrollWidth <= Math.ceil(r.width) })"
         )
+        assert WebDriverWait(page, 600).until(lambda _: page.execute_script(BAR))
         light = page.execute_script(PICTURE)
         element(page, "theme").click()
         assert page.execute_script("return document.documentElement.dataset.theme") == "dark"

@@ -302,6 +302,8 @@ function listenToKeys() {
 
 function layOut() {
   map.resize();
+  const [stage, toggles] = ["stage", "toggles"].map((id) => find(id).getBoundingClientRect());
+  map.covered = { right: toggles.right - stage.left, high: stage.bottom - toggles.top };
   timeline.draw();
   if (state.fitted) fit();
   else draw();

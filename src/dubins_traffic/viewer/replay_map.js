@@ -40,6 +40,7 @@ class MapView {
     this.context = canvas.getContext("2d");
     this.camera = new Camera();
     this.colours = {};
+    this.covered = { right: 0, high: 0 };
     this.layer = { canvas: document.createElement("canvas"), key: "", last: "" };
     this.roads = new Path2D();
     addLines(this.roads, trial.lines);
@@ -89,7 +90,7 @@ class MapView {
     const span = (values) => values.reduce(([low, high], value) => [Math.min(low, value), Math.max(high, value)], [Infinity, -Infinity]);
     const [left, right] = span(xs);
     const [bottom, top] = span(ys);
-    const wide = Math.max(camera.width - beside, 0.5 * camera.width);
+    const wide = Math.max(camera.width - beside - 16, 0.5 * camera.width);
     const high = Math.max(camera.height - above - below, 0.4 * camera.height);
     camera.scale = Math.min(wide / (right - left + 2 * margin), high / (top - bottom + 2 * margin));
     camera.x = (left + right) / 2 + beside / 2 / camera.scale;
@@ -353,7 +354,7 @@ class MapView {
     }
   }
 
-  // A bar of 1, 2 or 5 times a power of ten metres.
+  // A bar of 1, 2 or 5 times a power of ten metres, above the controls in the lower left corner if these reach below it.
   drawScale() {
     const { context: c, camera, colours } = this;
     const rough = 110 / camera.scale;
@@ -364,7 +365,9 @@ class MapView {
     c.lineWidth = 1.5;
     c.lineCap = "butt";
     c.beginPath();
-    const [right, low] = [camera.width - 16, camera.height - 14];
+    const right = camera.width - 16;
+    const free = right - length > this.covered.right + 8;
+    const low = camera.height - (free ? 14 : this.covered.high + 8);
     c.moveTo(right, low - 6);
     c.lineTo(right, low);
     c.lineTo(right - length, low);
