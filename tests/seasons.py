@@ -5,8 +5,6 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
@@ -17,22 +15,12 @@ from dubins_traffic.service.client import TOKEN
 from dubins_traffic.service.database import Database
 from dubins_traffic.service.database_tables import Chunk, Submission, Trial
 from dubins_traffic.service.storage import Storage
-from tests.services import Person, Service, competition_text, serving
+from tests.services import Person, Service
 
 FAULTS = int(os.environ.get("DUBINS_TRAFFIC_FAULTS", "3"))
 TRIALS = 4
 SETTINGS = "lease = 2.0\nlogins = 10000\n"
 SUBMISSIONS = "/competitions/short/phases/practice/submissions"
-
-
-@contextmanager
-def season(folder: Path, settings: str, *arguments: str, port: int = 0) -> Iterator[Service]:
-    """Serve a competition whose phases have `TRIALS` trials."""
-    folder.mkdir(exist_ok=True)
-    (folder / "short.toml").write_text(competition_text(TRIALS))
-    made = ("--competition", str(folder / "short.toml"), "--trust-submissions", *arguments)
-    with serving(folder / "here", *made, settings=settings, port=port) as service:
-        yield service
 
 
 def database_of(folder: Path, settings: str) -> Database:

@@ -237,13 +237,18 @@ def serving(
 
 @contextmanager
 def season(
-    folder: Path, *, judged: bool = True, settings: str = "logins = 10000\n", clean: bool = False
+    folder: Path,
+    *arguments: str,
+    settings: str = "logins = 10000\n",
+    trials: int = 2,
+    port: int = 0,
+    clean: bool = False,
 ) -> Iterator[Service]:
-    """Run the service of a short competition below a folder; `judged`: by workers that trust submissions."""
-    (folder / "short.toml").write_text(competition_text())
-    how = ("--trust-submissions",) if judged else ("--workers", "0")
-    competition = ("--competition", str(folder / "short.toml"))
-    with serving(folder / "here", *how, *competition, settings=settings, clean=clean) as service:
+    """Run the service of a short competition below a folder, with workers that trust submissions."""
+    folder.mkdir(exist_ok=True)
+    (folder / "short.toml").write_text(competition_text(trials))
+    made = ("--competition", str(folder / "short.toml"), "--trust-submissions", *arguments)
+    with serving(folder / "here", *made, settings=settings, port=port, clean=clean) as service:
         yield service
 
 

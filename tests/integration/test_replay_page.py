@@ -388,7 +388,7 @@ for (let y = map.height - 1; y > 0; y -= 1) {
   }
 }
 return false;"""
-"""Whether 30 pixels in a row of the scale's colour, looked for from the right below, lie beside or above the toggles."""
+"""Whether 30 pixels in a row of the scale's colour, the lowest of all, lie beside or above the toggles."""
 
 
 @pytest.mark.parametrize("width", [360, 400, 820, 1280])

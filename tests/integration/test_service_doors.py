@@ -19,7 +19,7 @@ SENDERS = 4
 @pytest.fixture(scope="module")
 def service(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Service]:
     folder = tmp_path_factory.mktemp("doors")
-    with season(folder, judged=False, clean=True) as running:
+    with season(folder, "--workers", "0", clean=True) as running:
         yield running
 
 

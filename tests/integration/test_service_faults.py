@@ -23,14 +23,14 @@ from tests.seasons import (
     FAULTS,
     SETTINGS,
     SUBMISSIONS,
+    TRIALS,
     counted_once,
     database_of,
     launched,
     running,
-    season,
     sent,
 )
-from tests.services import STANDING, Person, answers, shown_secret, wait_until
+from tests.services import STANDING, Person, answers, season, shown_secret, wait_until
 
 pytestmark = pytest.mark.tools
 
@@ -54,7 +54,7 @@ def settings(request: pytest.FixtureRequest) -> str:
 
 
 def test_workers_killed_with_a_lease(tmp_path: Path, settings: str) -> None:
-    with season(tmp_path, settings, "--workers", "0") as service:
+    with season(tmp_path, "--workers", "0", settings=settings, trials=TRIALS) as service:
         organiser = service.organiser()
         token = shown_secret(organiser.post("/desk/worker", form="/desk", name="far away"))
         people = [service.person().join(organiser.invite(), f"p{k}", f"t{k}") for k in range(TEAMS)]
@@ -79,7 +79,7 @@ def test_workers_killed_with_a_lease(tmp_path: Path, settings: str) -> None:
 def test_the_database_restarted(tmp_path: Path, cluster: postgres.Cluster) -> None:
     url = cluster.url(f"restarts{next(NUMBERS)}")
     settings = f'{SETTINGS}database = "{url}"\n'
-    with season(tmp_path, settings, "--workers", "1") as service:
+    with season(tmp_path, "--workers", "1", settings=settings, trials=TRIALS) as service:
         organiser = service.organiser()
         person = service.person().join(organiser.invite(), "Ann", "Ants")
         number = person.submit("short/practice", STANDING)
@@ -95,7 +95,7 @@ def test_the_database_restarted(tmp_path: Path, cluster: postgres.Cluster) -> No
 def test_the_server_killed_in_uploads(tmp_path: Path, settings: str) -> None:
     """What was confirmed is there afterwards, once; what was not may be sent again."""
     confirmed: dict[str, int] = {}
-    with season(tmp_path, settings, "--workers", "0") as service:
+    with season(tmp_path, "--workers", "0", settings=settings, trials=TRIALS) as service:
         organiser = service.organiser()
         person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
         port = int(service.url.rpartition(":")[2])
@@ -105,7 +105,7 @@ def test_the_server_killed_in_uploads(tmp_path: Path, settings: str) -> None:
         service.kill()
         sender.join()
     assert confirmed
-    with season(tmp_path, settings, "--workers", "0", port=port) as service:
+    with season(tmp_path, "--workers", "0", settings=settings, trials=TRIALS, port=port) as service:
         for text, number in confirmed.items():
             assert sent(person, text) == number
         everything = person.api("GET", SUBMISSIONS).json()
@@ -115,7 +115,9 @@ def test_the_server_killed_in_uploads(tmp_path: Path, settings: str) -> None:
 
 
 def test_told_to_end_it_gives_back_what_is_on_lease(tmp_path: Path) -> None:
-    with season(tmp_path, SETTINGS.replace("2.0", "600.0"), "--workers", "1") as service:
+    with season(
+        tmp_path, "--workers", "1", settings=SETTINGS.replace("2.0", "600.0"), trials=TRIALS
+    ) as service:
         organiser = service.organiser()
         person = service.person().join(organiser.invite(), "Ann", "Ants")
         number = person.submit("short/practice", STANDING)

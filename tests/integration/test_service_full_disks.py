@@ -12,8 +12,8 @@ import pytest
 
 from tests import postgres
 from tests.disks import fill, small_disk
-from tests.seasons import FAULTS, SETTINGS, counted_once, kept_whole, offered, season, sent
-from tests.services import STANDING, Person, wait_until
+from tests.seasons import FAULTS, SETTINGS, TRIALS, counted_once, kept_whole, offered, sent
+from tests.services import STANDING, Person, season, wait_until
 
 pytestmark = pytest.mark.tools
 
@@ -33,7 +33,7 @@ def open_folder() -> Iterator[Path]:
 def test_the_disk_of_the_service(tmp_path: Path) -> None:
     """Database, store and worker find no room: what is sent is refused, nothing is half kept, and then all goes on."""
     with small_disk(tmp_path / "here", 24 << 10) as here:
-        with season(tmp_path, SETTINGS, "--workers", "1") as service:
+        with season(tmp_path, "--workers", "1", settings=SETTINGS, trials=TRIALS) as service:
             organiser = service.organiser()
             person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
             log, numbers = tmp_path / "here.log", list[int]()
@@ -65,7 +65,7 @@ def test_the_disk_of_the_store(tmp_path: Path) -> None:
     """A worker keeps what it can't hand over, and hands it over when there is room: no trial is run a second time."""
     with small_disk(tmp_path / "disk", 8 << 10) as disk:
         settings = f'{SETTINGS}storage = "{disk / "store"}"\n'
-        with season(tmp_path, settings, "--workers", "1") as service:
+        with season(tmp_path, "--workers", "1", settings=settings, trials=TRIALS) as service:
             organiser = service.organiser()
             person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
             log = tmp_path / "here.log"
@@ -88,7 +88,7 @@ def test_the_disk_of_postgresql(tmp_path: Path, open_folder: Path) -> None:
     with small_disk(open_folder / "disk", 96 << 10) as disk, postgres.cluster(disk) as cluster:
         url = cluster.url("full")
         settings = f'{SETTINGS}database = "{url}"\n'
-        with season(tmp_path, settings, "--workers", "1") as service:
+        with season(tmp_path, "--workers", "1", settings=settings, trials=TRIALS) as service:
             organiser = service.organiser()
             person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
             numbers = [person.submit("short/practice", STANDING)]

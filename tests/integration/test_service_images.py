@@ -10,7 +10,8 @@ import pytest
 
 from tests import images
 from tests.boxes import needs_boxes
-from tests.seasons import SETTINGS, season
+from tests.seasons import SETTINGS, TRIALS
+from tests.services import season
 
 pytestmark = pytest.mark.tools("boxes")
 
@@ -20,7 +21,7 @@ def test_an_image_is_judged_and_what_is_none_is_rejected(tmp_path: Path) -> None
     images.require()
     source = images.layer(tmp_path, files={"drive": images.program(tmp_path).read_bytes()})
     image = images.image(tmp_path, source, 'CMD ["/drive"]').read_bytes()
-    with season(tmp_path, SETTINGS, "--workers", "1") as service:
+    with season(tmp_path, "--workers", "1", settings=SETTINGS, trials=TRIALS) as service:
         organiser = service.organiser()
         person = service.person().join(organiser.invite(), "Ann", "Ants")
         good = person.submit("short/practice", packed(image), "image.zip")

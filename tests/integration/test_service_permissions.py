@@ -140,7 +140,7 @@ class World:
 @pytest.fixture(scope="module")
 def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
     folder = tmp_path_factory.mktemp("permissions")
-    with season(folder, judged=False, clean=True) as service:
+    with season(folder, "--workers", "0", clean=True) as service:
         organiser = service.organiser().with_token()
         team = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
         other = service.person().join(organiser.invite(), "Bob", "Bees").with_token()

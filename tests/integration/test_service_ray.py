@@ -15,8 +15,8 @@ from dubins_traffic.cli.main import main
 from dubins_traffic.service.client import TOKEN
 from dubins_traffic.service.database_tables import Chunk
 from tests import ray_cluster
-from tests.seasons import FAULTS, SETTINGS, counted_once, database_of, launched, season
-from tests.services import STANDING, shown_secret, wait_until
+from tests.seasons import FAULTS, SETTINGS, TRIALS, counted_once, database_of, launched
+from tests.services import STANDING, season, shown_secret, wait_until
 
 pytestmark = pytest.mark.tools
 
@@ -24,7 +24,10 @@ TEAMS = max(2, FAULTS // 3)
 
 
 def test_actors_and_a_node_are_killed(tmp_path: Path) -> None:
-    with ray_cluster.running() as cluster, season(tmp_path, SETTINGS, "--workers", "0") as service:
+    with (
+        ray_cluster.running() as cluster,
+        season(tmp_path, "--workers", "0", settings=SETTINGS, trials=TRIALS) as service,
+    ):
         organiser = service.organiser()
         token = shown_secret(organiser.post("/desk/worker", form="/desk", name="cluster"))
         people = [service.person().join(organiser.invite(), f"p{k}", f"t{k}") for k in range(TEAMS)]

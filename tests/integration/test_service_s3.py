@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from tests import s3
-from tests.seasons import SETTINGS, counted_once, kept_whole, offered, season, sent
-from tests.services import STANDING, Person, wait_until
+from tests.seasons import SETTINGS, TRIALS, counted_once, kept_whole, offered, sent
+from tests.services import STANDING, Person, season, wait_until
 
 pytestmark = pytest.mark.tools
 
@@ -40,7 +40,7 @@ def wire(store: s3.Store, monkeypatch: pytest.MonkeyPatch) -> Iterator[s3.Wire]:
 
 def test_a_season_over_s3(tmp_path: Path, store: s3.Store, wire: s3.Wire) -> None:
     log = tmp_path / "here.log"
-    with season(tmp_path, S3_SETTINGS, "--workers", "1") as service:
+    with season(tmp_path, "--workers", "1", settings=S3_SETTINGS, trials=TRIALS) as service:
         organiser = service.organiser()
         person = service.person().join(organiser.invite(), "Ann", "Ants").with_token()
         number = person.submit("short/practice", STANDING)

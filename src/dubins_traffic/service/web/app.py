@@ -6,6 +6,7 @@ Nothing is kept of others; no session outlives its log-in or keeps an older one'
 from __future__ import annotations
 
 import contextlib
+import secrets
 from pathlib import Path
 from typing import Any
 
@@ -146,7 +147,7 @@ def create_app(service: Service) -> Litestar:
         template_config=TemplateConfig(instance=JinjaTemplateEngine.from_environment(templates())),
         stores={"sessions": kept},
         on_startup=[kept.delete_expired],
-        exception_handlers=dict.fromkeys((HTTPException, *STATUS), _answer_to),  # pyright: ignore[reportArgumentType]
+        exception_handlers=dict.fromkeys((HTTPException, Exception, *STATUS), _answer_to),  # pyright: ignore[reportArgumentType]
         after_request=_with_headers,
         request_max_body_size=largest,
         logging_config=None,
@@ -210,16 +211,23 @@ async def _with_headers(response: Response[Any]) -> Response[Any]:
 
 
 def _answer_to(request: Request[Any, Any, Any], error: Exception) -> Response[Any]:
-    """Return what went wrong: JSON to programs, a page to people; who is not logged in is led to the door."""
+    """Return what went wrong: JSON to programs, a page to people; who is not logged in is led to the door.
+
+    Of what nobody has foreseen they are told a number alone, and the log tells the rest under that.
+    """
+    known = (HTTPException, *STATUS)
+    unforeseen = {} if isinstance(error, known) else {"number": secrets.token_hex(4), "exc_info": error}
     if isinstance(error, HTTPException):
         status, detail = error.status_code, error.detail
         if status < 500 and error.extra:
             detail = f"{detail}: {error.extra}"[:500]
+    elif unforeseen:
+        status, detail = 500, f"a fault of this service, which its log tells as {unforeseen['number']}"
     else:
         status = next(code for kind, code in STATUS.items() if isinstance(error, kind))
         detail = "the database is away" if isinstance(error, DBAPIError) else str(error)
     if status >= 500:
-        log.error("request failed", path=request.url.path, status=status, error=str(error))
+        log.error("request failed", path=request.url.path, status=status, error=str(error), **unforeseen)
     if request.url.path.startswith(PROGRAMS):
         return Response(
             {"status_code": status, "detail": detail},
