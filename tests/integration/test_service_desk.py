@@ -247,6 +247,20 @@ def test_a_finished_competition_is_a_site_that_needs_no_server(
     assert organiser.post(act, form=act).status_code == 303
     path = "/competitions/short/phases/validation/table"
     wait_until(lambda: service.person().api("GET", path).json())
+    feathers = service.person()
+    seen = {
+        path: feathers.get(path)
+        for path in (
+            "/c/short/validation/table.csv",
+            "/c/short/news.atom",
+            f"/s/{number}/trials/0",
+            f"/s/{number}/trials/0/replay",
+        )
+    }
+    assert [path for path, answer in seen.items() if answer.status_code != 200] == []
+    assert "Bees" in seen["/c/short/validation/table.csv"].text
+    texts = [answer.text for answer in seen.values()]
+    assert not any(said in text for text in texts for said in ("swordfish", "no idea what to do"))
     with zipfile.ZipFile(io.BytesIO(organiser.get(place).content)) as packed:
         packed.extractall(tmp_path)
     site = tmp_path / "short"

@@ -5,9 +5,11 @@ The suite takes a part of the counts; `DUBINS_TRAFFIC_FAULTS=20` takes 20 worker
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import os
 import signal
+import socket
 import threading
 import time
 from collections.abc import Iterator
@@ -34,6 +36,8 @@ from tests.services import STANDING, Person, answers, season, shown_secret, wait
 
 pytestmark = pytest.mark.tools
 
+SLOW = 4
+"""Submissions that are judged beside slow connections."""
 NUMBERS = itertools.count()
 TEAMS = max(2, FAULTS // 3)
 """So many that no chunk loses its worker so often that it is given up."""
@@ -128,6 +132,38 @@ def test_told_to_end_it_gives_back_what_is_on_lease(tmp_path: Path) -> None:
     with database.reading() as session:
         assert "leased" not in set(session.scalars(select(Chunk.state)))
         assert session.get_one(Submission, number).state in ("running", "scoring", "done")
+    database.close()
+
+
+def test_slow_connections_cost_no_lease(tmp_path: Path) -> None:
+    """Sixty of them send a byte of a head again and again, while leases of two seconds are held."""
+    with season(tmp_path, "--workers", "1", settings=SETTINGS, trials=TRIALS) as service:
+        person = service.person().join(service.organiser().invite(), "Ann", "Ants").with_token()
+        host, _, port = service.url.removeprefix("http://").partition(":")
+        ended = threading.Event()
+
+        def dawdle() -> None:
+            while not ended.is_set():
+                with contextlib.suppress(OSError), socket.create_connection((host, int(port))) as there:
+                    there.sendall(b"POST /api/lease HTTP/1.1\r\nx: ")
+                    while not ended.wait(0.2):
+                        there.sendall(b"a")
+
+        dawdling = [threading.Thread(target=dawdle) for _ in range(60)]
+        for thread in dawdling:
+            thread.start()
+        try:
+            numbers = [sent(person, f"{STANDING}\n# {k}\n") for k in range(SLOW)]
+            for number in numbers:
+                person.ended(number)
+        finally:
+            ended.set()
+            for thread in dawdling:
+                thread.join()
+    counted_once(tmp_path, SETTINGS, SLOW)
+    database = database_of(tmp_path, SETTINGS)
+    with database.reading() as session:
+        assert set(session.scalars(select(Chunk.attempts))) == {1}
     database.close()
 
 

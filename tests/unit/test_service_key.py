@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions, viewing
 from dubins_traffic.service.database_tables import Account, Phase, Submission
-from dubins_traffic.service.service import Service
+from dubins_traffic.service.service import NoKeyError, Service
 from dubins_traffic.service.submissions import Upload
 from dubins_traffic.service.web.app import create_app
 from tests.services import competition_text
@@ -99,6 +99,23 @@ def test_without_the_key_submissions_are_taken_and_wait_until_it_is_there(tmp_pa
         leased = queue.take(session, "w", keyless.clock(), 60.0)
         assert leased is not None
         assert leased.submission_id == 1
+    keyless.close()
+
+
+@pytest.mark.usefixtures("service")
+def test_another_key_opens_nothing_and_is_told_at_the_start(tmp_path: Path) -> None:
+    key = tmp_path / "here.key"
+    kept = key.read_text()
+    key.write_text("f" * 64)
+    with pytest.raises(NoKeyError, match=r"here\.key: not the key of this folder") as told:
+        opened(tmp_path)
+    assert "f" * 8 not in str(told.value)
+    key.unlink()
+    keyless = opened(tmp_path)
+    key.write_text("f" * 64)
+    assert not keyless.has_key()
+    key.write_text(kept)
+    assert keyless.has_key()
     keyless.close()
 
 

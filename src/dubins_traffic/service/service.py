@@ -21,14 +21,15 @@ from sqlalchemy.orm import Session, joinedload
 from dubins_traffic.competition import competition as files
 from dubins_traffic.competition import sealing
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import exists, read_text
+from dubins_traffic.files import exists, read_text, replace_file
 from dubins_traffic.problem.faults import Strict, parse
 from dubins_traffic.service.database import Database
 from dubins_traffic.service.database_tables import Competition, Phase
-from dubins_traffic.service.hiding import NOTHING, Hiding, hiding_of
+from dubins_traffic.service.hiding import NOTHING, HiddenError, Hiding, hiding_of
 from dubins_traffic.service.storage import Storage
 
 FILE = "service.toml"
+CHECK = "key.check"
 Positive = Annotated[float, Field(gt=0)]
 
 
@@ -171,9 +172,9 @@ class Service:
         return self._hidings[row.id]
 
     def needed_key(self) -> bytes:
-        """Return what unlocks secret seeds, as soon as its file is there; NoKeyError if it is not."""
+        """Return what unlocks secret seeds, as soon as its file is there; NoKeyError if it is not, or is another's."""
         if self._read_key is None and self.key_file is not None and exists(self.key_file):
-            self._read_key = sealing.read_key(self.key_file, self.folder)
+            self._read_key = _read(self.key_file, self.folder)
         if self._read_key is None:
             raise NoKeyError(
                 "no key for what is secret", file="--key-file", expected="a key file outside the folder"
@@ -237,4 +238,22 @@ def _key(path: Path, folder: Path) -> bytes | None:
             return None
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         sealing.make_key_file(path, folder)
-    return sealing.read_key(path, folder)
+    return _read(path, folder)
+
+
+def _read(path: Path, folder: Path) -> bytes:
+    """Return the key in a file; NoKeyError if a service of this folder has had another one before.
+
+    What the first key has encrypted stays in the folder, and tells the others.
+    """
+    key, check = sealing.read_key(path, folder), folder / CHECK
+    hiding = hiding_of(key, CHECK)
+    if not check.exists():
+        replace_file(check, lambda neighbour: neighbour.write_bytes(hiding.hide(b"", CHECK)), durable=True)
+    try:
+        hiding.show(check.read_bytes(), CHECK)
+    except HiddenError:
+        raise NoKeyError(
+            "not the key of this folder", file=str(path), expected=f"the key that wrote {check}"
+        ) from None
+    return key
