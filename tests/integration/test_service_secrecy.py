@@ -18,15 +18,16 @@ from pathlib import Path
 
 import httpx
 import pytest
+import zstandard
 from sqlalchemy import select
 
-from dubins_traffic.competition.sealing import make_key_file, unsealed
+from dubins_traffic.competition.sealing import make_key_file, read_key, unsealed
 from dubins_traffic.service import viewing
 from dubins_traffic.service.database_tables import Phase, Submission, Trial
-from dubins_traffic.service.hiding import HiddenError
+from dubins_traffic.service.hiding import HiddenError, hiding_of
 from dubins_traffic.service.service import NoKeyError
 from dubins_traffic.service.service import Service as StoredService
-from tests import postgres
+from tests import postgres, s3
 from tests.services import CRASHING, Person, season, wait_until
 
 pytestmark = pytest.mark.tools
@@ -74,7 +75,7 @@ def is_telling(value: object) -> bool:
 
 
 def unpacked(data: bytes) -> Iterator[bytes]:
-    """Yield bytes, what is packed by gzip in them, and the members of an archive."""
+    """Yield bytes, what is packed by gzip or Zstandard in them, and the members of an archive."""
     yield data
     if zipfile.is_zipfile(io.BytesIO(data)):
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
@@ -83,6 +84,11 @@ def unpacked(data: bytes) -> Iterator[bytes]:
         try:
             yield zlib.decompressobj(31).decompress(data[found.start() :])
         except zlib.error:
+            continue
+    for found in re.finditer(rb"\x28\xb5\x2f\xfd", data):
+        try:
+            yield zstandard.ZstdDecompressor().decompressobj().decompress(data[found.start() :])
+        except zstandard.ZstdError:
             continue
 
 
@@ -117,6 +123,16 @@ def test_nothing_of_a_secret_phase_is_written_in_clear_in_postgresql(
         a_season(tmp_path, f'database = "{cluster.url("secrecy")}"\n', [open_folder])
 
 
+def test_nothing_of_a_secret_phase_is_written_in_clear_in_a_bucket(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with s3.store(tmp_path / "s3") as store:
+        for name, value in store.environment().items():
+            monkeypatch.setenv(name, value)
+        a_season(tmp_path, f'storage = "s3://{s3.BUCKET}/here"\n', [tmp_path / "s3"])
+        assert not (tmp_path / "here" / "store").exists()
+
+
 @pytest.mark.parametrize("form", range(12))
 def test_a_seed_is_found_however_it_is_written(tmp_path: Path, form: int) -> None:
     seed = 12067423490827346012
@@ -130,9 +146,10 @@ def test_a_seed_is_found_however_it_is_written(tmp_path: Path, form: int) -> Non
         little.hex().encode(),
     ]
     text = [*plain, *(base64.b64encode(b"a" * k + own) for k, own in enumerate(plain))][form]
-    (tmp_path / "page").write_bytes(gzip.compress(b"before " + text + b" after"))
-    assert holding([tmp_path], forms(seed)) == [str(tmp_path / "page")]
-    assert holding([tmp_path], forms(seed ^ 1 << 40)) == []
+    for pack in (gzip.compress, zstandard.compress):
+        (tmp_path / "page").write_bytes(b"head " + pack(b"before " + text + b" after"))
+        assert holding([tmp_path], forms(seed)) == [str(tmp_path / "page")]
+        assert holding([tmp_path], forms(seed ^ 1 << 40)) == []
 
 
 @pytest.mark.parametrize("order", "<>")
@@ -165,7 +182,7 @@ def a_season(tmp_path: Path, settings: str, also: list[Path]) -> None:
         assert len(results) > 20
         copied(folder, tmp_path / "copies", organiser)
         assert holding([*looked_at, tmp_path / "copies"], secret | results) == []
-        assert len(list((folder / "store" / "replays").rglob("*/*"))) > 4
+        assert len(kept_replays(folder)) > 4
         shown_to_organisers(organiser, numbers[2])
         unreadable(folder, tmp_path / "other.key", numbers[2])
         for act in ("close", "reveal"):
@@ -202,6 +219,17 @@ def planted_in(folder: Path) -> set[bytes]:
             starts = [start for k, seed in enumerate(seeds) for start in phase.instance(k, seed).starts]
             places = [place for start in starts for place in (start.x, start.y)]
             found |= {form for place in filter(is_telling, places) for form in float_forms(place)}
+    stored.close()
+    return found
+
+
+def kept_replays(folder: Path) -> set[str]:
+    """Return the replays of which the database knows, after each has been found in the store."""
+    stored = StoredService(folder, folder.with_suffix(".key"))
+    with stored.database.reading() as session:
+        found = {own for own in session.scalars(select(Trial.replay)) if own is not None}
+    for digest in found:
+        stored.storage.get(digest, "replays")
     stored.close()
     return found
 
@@ -251,18 +279,19 @@ def unreadable(folder: Path, other: Path, number: int) -> None:
     keyless.close()
     assert not other.exists()
     make_key_file(other, folder)
-    stored, own = StoredService(folder, other), StoredService(folder, folder.with_suffix(".key"))
-    with stored.database.reading() as session:
+    with pytest.raises(NoKeyError, match="not the key of this folder"):
+        StoredService(folder, other)
+    own = StoredService(folder, folder.with_suffix(".key"))
+    with own.database.reading() as session:
         submission = session.get_one(Submission, number)
-        with pytest.raises(HiddenError, match="another key"):
-            viewing.trial_of(stored, session, submission, 0)
         first, second = session.scalars(select(Trial).where(Trial.submission_id == number)).all()
         assert viewing.trial_of(own, session, submission, 0) is not None
+        with pytest.raises(HiddenError, match="another key"):
+            hiding_of(read_key(other, folder), f"short/{submission.phase.name}").shown(first)
         first.hidden, second.hidden = second.hidden, first.hidden
         with session.no_autoflush, pytest.raises(HiddenError, match="changed"):
             own.hiding(submission.phase).shown(first)
         session.rollback()
-    stored.close()
     own.close()
 
 
