@@ -47,9 +47,13 @@ def world(grid: tuple[int, int], length: float, agents: list[dict[str, Any]], **
 
 
 FREE: Final = [{"type": "free", "name": "free", "count": 2}]
-SOON: Final = {"rest_time": 15.0, "journey_start_time": 8.0, "goal_time": 20.0, "gap_rounds": 9.0}
-"""Limits by which all that others may do to make the ego wait is over after 180 s: so 240 s show it."""
-WAITING: Final = world((2, 2), 3.5, FREE, rules=SOON, duration=240)
+SOON: Final = {
+    "rest_time": 40.0, "journey_start_time": 8.0, "goal_time": 20.0, "gap_rounds": 17.5
+}  # fmt: skip
+"""Limits by which all that others may do to make the ego wait is over after 350 s: so 440 s show it.
+
+A shorter time for a journey would leave a free car none in which it does as it likes (`agents.free.RESERVE`)."""
+WAITING: Final = world((2, 2), 3.5, FREE, rules=SOON, duration=440)
 PROVOKING: Final = world((2, 3), 4.0, [{"type": "lawful", "name": "lawful", "count": 4}], duration=120)
 AMONG_FREE: Final = world(
     (2, 3), 4.0, [*FREE, {"type": "lawful", "name": "lawful"}], rules={"gap_rounds": 4.0}, duration=120
@@ -69,7 +73,7 @@ class Wanted:
 
 SEARCHES: Final = {
     "rules": Wanted(
-        "rules", WAITING, BLOCKED, "`rules` between two free cars on a ring of four bends, trials of 240 s"
+        "rules", WAITING, BLOCKED, "`rules` between two free cars on a ring of four bends, trials of 440 s"
     ),
     "lanes": Wanted(
         "lanes+shield", WAITING, BLOCKED, "`lanes+shield`, which waits for more than the rules ask, the same",

@@ -26,6 +26,7 @@ from benchmarks.table import Row, show
 
 from dubins_traffic.falsification.search import Search, falsify
 from dubins_traffic.problem.configuration import Configuration
+from experiments.contract import SOON, WAITING
 from experiments.planted_norms import EXIT, FLIPS, HOLE, NONE, QUEUE, REST, SAYS, TURNS, digest, plant
 
 ROOT: Final = Path(__file__).resolve().parents[1]
@@ -49,12 +50,9 @@ def world(
     } | more  # fmt: skip
 
 
+RESTING: Final = WAITING | {"rules": SOON | {"linger_distance": 0.1}}
+"""Where a car rests that has not moved a decimetre in ten seconds: it need not go round the ring to keep from that."""
 LAWFUL: Final = [{"type": "lawful", "name": "lawful", "count": 3}]
-WAITING: Final = world(
-    RING, [{"type": "free", "name": "free", "count": 2}], 600.0, rules={"gap_rounds": 24.0}
-)
-"""Two free cars on a ring of four bends. The ego must not go without a visit for longer than each of the three cars may
-take for the longest journey with what excuses it for a while, and a goal be taken for E6's minute: 480 s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +66,7 @@ class Hole:
 
 
 HOLES: Final = {
-    "rest": Hole(REST, "blocked", "rules", WAITING),
+    "rest": Hole(REST, "blocked", "rules", RESTING),
     "exit": Hole(
         EXIT, "provoked", STANDS,
         world(RING, LAWFUL, 60.0, car={"body": {"rectangle": {"length": 0.62, "width": 0.28}}}),

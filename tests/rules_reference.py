@@ -320,6 +320,8 @@ class Reference:
     def obstacle_range(self, lane: tuple[int, int], obstacle: Any, low: float, high: float) -> Any:
         """Lateral range of an obstacle where its progress is in [low, high] on the segment, by sampling."""
         low, high = max(low, 0.0), min(high, self.length(lane[0]))
+        if low > high:
+            return None
         if isinstance(obstacle, DiscObstacle):
             s, lateral = self.coordinates(lane, obstacle.x, obstacle.y)
             if s + obstacle.radius < low or s - obstacle.radius > high:

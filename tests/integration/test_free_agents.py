@@ -11,6 +11,8 @@ from typing import Any
 
 import numpy as np
 import pytest
+from experiments.contract import AMONG_FREE, WAITING
+from experiments.planted import RESTING
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.controllers.shield import Shield
@@ -128,6 +130,18 @@ def test_they_do_what_no_lawful_car_does() -> None:
     assert backed > 0.8 * len(done)
     assert to_and_fro > 0.3 * len(done)
     assert into_discs > 0
+
+
+@pytest.mark.parametrize("world", [WAITING, RESTING, AMONG_FREE], ids=["waiting", "resting", "among free"])
+def test_where_they_are_searched_the_limits_leave_them_time_of_their_own(world: dict[str, Any]) -> None:
+    """With a shorter `rest_time` the law would drive them all the time, and a search would find nothing in that."""
+    backed = 0
+    for number in range(8):
+        motion = Motion()
+        own = Configuration.from_document(world)
+        run_trial(replace(draw(own, 3, number), duration=120.0), "rules", sinks=[motion], sketch=False)
+        backed += motion.done()[0]
+    assert backed >= 6
 
 
 def test_commands_are_played_as_far_as_the_law_allows_and_end_before_e5_does() -> None:

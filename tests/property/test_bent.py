@@ -101,3 +101,8 @@ def _moved(pose: Pose, turn: complex) -> Pose:
 def test_the_referee_agrees_with_the_slow_judge() -> None:
     seen = sum((compare(number, BENT) for number in range(8)), start=compare(8, BENT))
     assert set(seen) >= set(EXPECTED)
+
+
+def test_an_obstacle_beyond_what_is_looked_at_does_not_lie_before_the_disc() -> None:
+    """Trial 480: the reference once took an empty stretch of a lane for one that a disc may lie in."""
+    assert compare(480, BENT)["E5"] > 0

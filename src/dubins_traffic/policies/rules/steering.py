@@ -75,6 +75,9 @@ def move(
     if passes or vehicle.tightest > 0.0:
         speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
     safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
+    if safe and speed == 0.0 and vehicle.tightest == 0.0 and (passes or steep == ABRUPT):
+        pose = Pose(state.x[b, n], state.y[b, n], *heading(Line(left - offset, px, py, allowed), steep))
+        safe = is_safe_from(pose, b, Command(allowed, 0.0), near, trusted, traffic, vehicle)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
     if returns and near > 0 and vehicle.tightest == 0.0:
         motion = Motion(speed, yaw_rate, safe)
@@ -86,11 +89,14 @@ def move(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
         )
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
-    elif not safe and (steep == ABRUPT or (passes and within_lane(drivers.car[b, n].aside, vehicle))):
-        across = 1.0 if left > offset else -1.0
+    elif not safe and (passes or steep == ABRUPT):
+        across, narrow = 1.0 if left > offset else -1.0, within_lane(drivers.car[b, n].aside, vehicle)
         speed, yaw_rate = steer(
-            c, s, across, px, py, bend, allowed, NIMBLE, aligned, limit, vehicle.tightest, vehicle.period
-        )
+            c, s, across, px, py, bend, allowed, NIMBLE if narrow else SQUARE, aligned, limit, vehicle.tightest,
+            vehicle.period,
+        )  # fmt: skip
+        if passes:
+            speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     if not safe:
         speed = 0.0
