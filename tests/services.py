@@ -121,8 +121,8 @@ class Person:
     def login(self, name: str, password: str = PASSWORD) -> httpx.Response:
         return self.post("/login", name=name, password=password)
 
-    def invite(self, role: str = "participant") -> str:
-        return shown_secret(self.post("/desk/invite", form="/desk", role=role))
+    def invite(self, role: str = "participant", competition: str = "") -> str:
+        return shown_secret(self.post("/desk/invite", form="/desk", role=role, competition=competition))
 
     def with_token(self) -> Person:
         """Make a token, with which `api` asks."""

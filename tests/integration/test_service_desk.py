@@ -164,13 +164,16 @@ def test_an_announcement_stands_on_the_page_and_in_the_feed(service: Service, or
     assert organiser.post("/desk/news/short", form=DESK, title="", text="x").status_code == 400
     number = re.search(r"/desk/retract/(\d+)", organiser.get(DESK).text)
     assert number is not None
+    asked = organiser.get(f"/desk/retract/{number[1]}").text
+    assert "Retract Rain" in asked
+    assert "It goes from the page and from the feed" in asked
     assert organiser.post(f"/desk/retract/{number[1]}", form=DESK).status_code == 303
     assert "Rain" not in service.person().get("/c/short/news.atom").text
     assert "<td>retract</td>" in log(organiser)
 
 
 def test_baselines_stand_apart_and_a_phase_opens_again_until_its_reveal(
-    service: Service, organiser: Person
+    service: Service, organiser: Person, tmp_path: Path
 ) -> None:
     ants = service.person().join(organiser.invite(), "Ann", "Ants")
     number = ants.submit("short/test", STANDING)
@@ -216,9 +219,14 @@ def test_baselines_stand_apart_and_a_phase_opens_again_until_its_reveal(
         assert form_of(organiser)["title"] == "By file"
     said = log(organiser)
     assert all(f"<td>{word}</td>" in said for word in ("baseline", "close", "re-open", "reveal"))
+    archived(service, organiser, tmp_path)
 
 
-def test_every_act_that_others_notice_asks_once(organiser: Person) -> None:
+def test_every_act_that_others_notice_asks_once(service: Service, organiser: Person) -> None:
+    urchins = service.person().join(organiser.invite(), "Una", "Urchins")
+    number = urchins.submit("short/practice", STANDING + "# by urchins\n")
+    given = {"title": "Fog", "text": "Drive slowly."}
+    assert organiser.post("/desk/news/short", form=DESK, **given).status_code == 303
     desk = organiser.get(DESK).text + organiser.get("/desk").text
     for path in re.findall(
         r'<form[^>]* action="([^"]+/(?:open|close|reveal|reopen|disqualify|remove))"', desk
@@ -226,14 +234,17 @@ def test_every_act_that_others_notice_asks_once(organiser: Person) -> None:
         asked = organiser.get(path)
         assert asked.status_code == 200
         assert f'<form method="post" action="{path}">' in asked.text
-    assert not re.search(r'method="post" action="[^"]+/(open|close|reveal|reopen|disqualify|remove)"', desk)
-    assert "its team reads why" in organiser.get("/desk/s/1/disqualify?why=x").text
-    assert "counts again" in organiser.get("/desk/s/1/disqualify").text
+    retract = re.search(r'<form action="(/desk/retract/\d+)"', desk)
+    assert retract is not None
+    assert f'<form method="post" action="{retract[1]}">' in organiser.get(retract[1]).text
+    acts = r'method="post" action="[^"]+/(open|close|reveal|reopen|disqualify|remove|retract/\d+)"'
+    assert not re.search(acts, desk)
+    assert "its team reads why" in organiser.get(f"/desk/s/{number}/disqualify?why=x").text
+    assert "counts again" in organiser.get(f"/desk/s/{number}/disqualify").text
 
 
-def test_a_finished_competition_is_a_site_that_needs_no_server(
-    service: Service, organiser: Person, tmp_path: Path
-) -> None:
+def archived(service: Service, organiser: Person, tmp_path: Path) -> None:
+    """A finished competition is a site that needs no server."""
     bees = service.person().join(organiser.invite(), "Bea", "Bees")
     number = bees.submit(
         "short/validation", CRASHING.replace("def start", "said = 'swordfish'\n\n    def start")

@@ -12,12 +12,14 @@ import pytest
 
 from dubins_traffic.service.service import Service as StoredService
 from dubins_traffic.service.web.app import create_app
-from tests.services import STANDING, Person, Service, season, shown_secret
+from tests.services import STANDING, Person, Service, competition_text, season, shown_secret
 
 NOBODY, OTHER, TEAM, ORGANISER, WORKER = "nobody", "other team", "team", "organiser", "worker"
-ROLES = (NOBODY, OTHER, TEAM, ORGANISER, WORKER)
-PEOPLE = {OTHER, TEAM, ORGANISER}
-ALL, OWN, NONE = set(ROLES), {TEAM, ORGANISER}, set[str]()
+ONE, ELSEWHERE = "organiser of this competition", "organiser of another one"
+ROLES = (NOBODY, OTHER, TEAM, ORGANISER, ONE, ELSEWHERE, WORKER)
+PEOPLE = {OTHER, TEAM, ORGANISER, ONE, ELSEWHERE}
+HEADS, ORGANISERS = {ORGANISER, ONE}, {ORGANISER, ONE, ELSEWHERE}
+ALL, OWN, NONE = set(ROLES), {TEAM, *HEADS}, set[str]()
 REFUSALS = (302, 401, 403, 404)
 NO_COMPETITION, NO_SUBMISSION = "/c/short/none", "/s/99999"
 
@@ -40,7 +42,7 @@ ROUTES: dict[tuple[str, str], tuple[str, set[str]]] = {
     ("GET", "/s/{number:int}/trials/{trial:int}/replay"): ("/s/1/trials/0/replay", NONE),
     ("GET", "/s/{number:int}/trials/{trial:int}/map.svg"): ("/s/1/trials/0/map.svg", NONE),
     ("GET", "/s/{number:int}/file"): ("/s/1/file", OWN),
-    ("GET", "/s/{number:int}/beside"): ("/s/1/beside?other=1", {ORGANISER}),
+    ("GET", "/s/{number:int}/beside"): ("/s/1/beside?other=1", HEADS),
     ("GET", "/trial.svg"): ("/trial.svg", ALL),
     ("GET", "/status"): ("/status", ALL),
     ("GET", "/login"): ("/login", ALL),
@@ -60,27 +62,28 @@ ROUTES: dict[tuple[str, str], tuple[str, set[str]]] = {
     ("POST", "/team/tokens/{number:int}/revoke"): ("/team/tokens/999/revoke", PEOPLE),
     ("POST", "/team/password"): ("/team/password", PEOPLE),
     ("POST", "/team/remove"): ("/team/remove", PEOPLE),
-    ("GET", "/desk"): ("/desk", {ORGANISER}),
+    ("GET", "/desk"): ("/desk", ORGANISERS),
     ("POST", "/desk/create"): ("/desk/create", {ORGANISER}),
-    ("POST", "/desk/invite"): ("/desk/invite", {ORGANISER}),
-    ("POST", "/desk/invitations/{number:int}/revoke"): ("/desk/invitations/999/revoke", {ORGANISER}),
+    ("POST", "/desk/invite"): ("/desk/invite", ORGANISERS),
+    ("POST", "/desk/invitations/{number:int}/revoke"): ("/desk/invitations/999/revoke", ORGANISERS),
     ("POST", "/desk/worker"): ("/desk/worker", {ORGANISER}),
     ("POST", "/desk/worker/{number:int}/revoke"): ("/desk/worker/999/revoke", {ORGANISER}),
     ("POST", "/desk/accounts/{number:int}/reset"): ("/desk/accounts/2/reset", {ORGANISER}),
     ("GET", "/desk/accounts/{number:int}/remove"): ("/desk/accounts/2/remove", {ORGANISER}),
     ("POST", "/desk/accounts/{number:int}/remove"): ("", {ORGANISER}),
-    ("GET", "/desk/edit/{slug:str}"): ("/desk/edit/short", {ORGANISER}),
-    ("POST", "/desk/edit/{slug:str}"): ("/desk/edit/short", {ORGANISER}),
-    ("POST", "/desk/file/{slug:str}"): ("/desk/file/short", {ORGANISER}),
-    ("POST", "/desk/news/{slug:str}"): ("/desk/news/short", {ORGANISER}),
-    ("POST", "/desk/retract/{number:int}"): ("/desk/retract/999", {ORGANISER}),
-    ("GET", "/desk/c/{slug:str}"): ("/desk/c/short", {ORGANISER}),
-    ("GET", "/desk/c/{slug:str}/archive.zip"): ("/desk/c/short/archive.zip", {ORGANISER}),
-    ("GET", "/desk/c/{slug:str}/export.zip"): ("/desk/c/short/export.zip", {ORGANISER}),
-    ("GET", "/desk/c/{slug:str}/{name:str}/{act:str}"): ("/desk/c/short/practice/close", {ORGANISER}),
-    ("GET", "/desk/s/{number:int}/{act:str}"): ("/desk/s/1/disqualify", {ORGANISER}),
-    ("POST", "/desk/c/{slug:str}/{name:str}/{act:str}"): ("/desk/c/short/practice/open", {ORGANISER}),
-    ("POST", "/desk/s/{number:int}/{act:str}"): ("/desk/s/1/disqualify", {ORGANISER}),
+    ("GET", "/desk/edit/{slug:str}"): ("/desk/edit/short", HEADS),
+    ("POST", "/desk/edit/{slug:str}"): ("/desk/edit/short", HEADS),
+    ("POST", "/desk/file/{slug:str}"): ("/desk/file/short", HEADS),
+    ("POST", "/desk/news/{slug:str}"): ("/desk/news/short", HEADS),
+    ("GET", "/desk/retract/{number:int}"): ("/desk/retract/1", HEADS),
+    ("POST", "/desk/retract/{number:int}"): ("/desk/retract/999", NONE),
+    ("GET", "/desk/c/{slug:str}"): ("/desk/c/short", HEADS),
+    ("GET", "/desk/c/{slug:str}/archive.zip"): ("/desk/c/short/archive.zip", HEADS),
+    ("GET", "/desk/c/{slug:str}/export.zip"): ("/desk/c/short/export.zip", HEADS),
+    ("GET", "/desk/c/{slug:str}/{name:str}/{act:str}"): ("/desk/c/short/practice/close", HEADS),
+    ("GET", "/desk/s/{number:int}/{act:str}"): ("/desk/s/1/disqualify", HEADS),
+    ("POST", "/desk/c/{slug:str}/{name:str}/{act:str}"): ("/desk/c/short/practice/open", HEADS),
+    ("POST", "/desk/s/{number:int}/{act:str}"): ("/desk/s/1/disqualify", HEADS),
     ("GET", "/desk/log"): ("/desk/log", {ORGANISER}),
     ("GET", "/api/status"): ("/api/status", ALL),
     ("GET", "/api/competitions"): ("/api/competitions", ALL),
@@ -103,7 +106,7 @@ ROUTES: dict[tuple[str, str], tuple[str, set[str]]] = {
     ("GET", "/api/submissions/{number:int}/logs"): ("/api/submissions/1/logs", OWN),
     ("POST", "/api/submissions/{number:int}/cancel"): ("/api/submissions/1/cancel", OWN),
     ("POST", "/api/submissions/{number:int}/name"): ("/api/submissions/1/name", OWN),
-    ("GET", "/metrics"): ("/metrics", {ORGANISER, WORKER}),
+    ("GET", "/metrics"): ("/metrics", ORGANISERS | {WORKER}),
     ("GET", "/worker/submissions/{digest:str}"): (f"/worker/submissions/{'0' * 64}", {WORKER}),
     ("POST", "/worker/lease"): ("", {WORKER}),
     ("POST", "/worker/chunks/{number:int}/heartbeat"): ("/worker/chunks/999/heartbeat", {WORKER}),
@@ -146,8 +149,18 @@ def world(tmp_path_factory: pytest.TempPathFactory) -> Iterator[World]:
         other = service.person().join(organiser.invite(), "Bob", "Bees").with_token()
         worker = service.person()
         worker.token = shown_secret(organiser.post("/desk/worker", form="/desk", name="far away"))
+        files = {"files": ("competition.toml", competition_text().encode())}
+        made = organiser.post("/desk/create", form="/desk", files=files, address="other")
+        assert made.status_code == 303
+        one, elsewhere = (
+            service.person().join(organiser.invite("organiser", competition), name).with_token()
+            for competition, name in (("short", "Odo"), ("other", "Ola"))
+        )
+        news = {"title": "Rain", "text": "Roads are wet."}
+        assert organiser.post("/desk/news/short", form="/desk", **news).status_code == 303
         assert team.submit("short/test", STANDING) == 1
-        people = {NOBODY: service.person(), OTHER: other, TEAM: team, ORGANISER: organiser, WORKER: worker}
+        people = {NOBODY: service.person(), OTHER: other, TEAM: team, WORKER: worker}
+        people |= {ORGANISER: organiser, ONE: one, ELSEWHERE: elsewhere}
         yield World(service, people)
 
 
@@ -177,6 +190,30 @@ def test_who_may_use_a_route(world: World, route: tuple[str, str], role: str) ->
         answer.status_code == 404 and role in allowed and path.endswith("0" * 64)
     )
     assert refused == (role not in allowed), (answer.status_code, answer.text[-600:])
+
+
+def test_an_organiser_of_one_competition_makes_organisers_of_that_alone(world: World) -> None:
+    one = world.people[ONE]
+    desk = one.get("/desk").text
+    assert "/desk/c/short" in desk
+    assert all(
+        word not in desk for word in ("/desk/c/other", "Workers", "People", "Log of acts", "/desk/create")
+    )
+    second = world.service.person().join(one.invite("organiser", "other"), "Oda")
+    assert second.get("/desk/c/short").status_code == 200
+    assert second.get("/desk/c/other").status_code == second.get("/desk/log").status_code == 403
+    assert "organiser of short" in world.people[ORGANISER].get("/desk").text
+    wrong = world.people[ORGANISER].post("/desk/invite", form="/desk", role="organiser", competition="none")
+    assert wrong.status_code == 404
+
+
+def test_an_organiser_elsewhere_does_not_disqualify_what_his_team_has_handed_in(world: World) -> None:
+    elsewhere = world.people[ELSEWHERE]
+    assert elsewhere.post("/team/found", form="/team", name="Eels").status_code == 303
+    number = elsewhere.submit("short/practice", STANDING)
+    act = f"/desk/s/{number}/disqualify"
+    assert elsewhere.get(f"/s/{number}").status_code == 200
+    assert elsewhere.get(act).status_code == elsewhere.post(act, form="/team", why="x").status_code == 404
 
 
 def test_a_form_without_its_hidden_field_is_refused(world: World) -> None:

@@ -17,7 +17,7 @@ from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.service.database import Database
-from dubins_traffic.service.database_tables import Account, Act, Code, Team, Token
+from dubins_traffic.service.database_tables import Account, Act, Code, Competition, Team, Token
 
 ORGANISER, PARTICIPANT = "organiser", "participant"
 ROLES = (PARTICIPANT, ORGANISER)
@@ -84,8 +84,19 @@ def digest_of(secret: str) -> str:
     return hashlib.sha256(secret.encode()).hexdigest()
 
 
-def invite(session: Session, role: str, team: Team | None, at: float, *, by: Account | None = None) -> str:
-    """Return a new code by which one person can register, for a team or for none yet; `by` is who invites."""
+def invite(
+    session: Session,
+    role: str,
+    team: Team | None,
+    at: float,
+    *,
+    by: Account | None = None,
+    organises: Competition | None = None,
+) -> str:
+    """Return a new code by which one person can register, for a team or for none yet; `by` is who invites.
+
+    An organiser who registers by it organises one competition, or all if none is given.
+    """
     code = secrets.token_urlsafe(32)
     session.add(
         Code(
@@ -93,6 +104,7 @@ def invite(session: Session, role: str, team: Team | None, at: float, *, by: Acc
             kind="invitation",
             role=role,
             team_id=team and team.id,
+            competition_id=organises and organises.id,
             made_by=by and by.id,
             expires=at + INVITATION_S,
         )
@@ -100,17 +112,23 @@ def invite(session: Session, role: str, team: Team | None, at: float, *, by: Acc
     return code
 
 
-def invitations(session: Session, at: float, team_id: int | None = None) -> Sequence[Code]:
-    """Return the invitations that are good: those to a team, else all."""
+def invitations(
+    session: Session, at: float, team_id: int | None = None, made_by: Account | None = None
+) -> Sequence[Code]:
+    """Return the invitations that are good: those to a team, those that somebody has made, or all."""
     query = select(Code).where(Code.kind == "invitation", Code.used.is_(None), Code.expires > at)
     if team_id is not None:
         query = query.where(Code.team_id == team_id)
+    if made_by is not None:
+        query = query.where(Code.made_by == made_by.id)
     return session.scalars(query.order_by(Code.id)).all()
 
 
-def revoke_invitation(session: Session, number: int, at: float, team_id: int | None = None) -> None:
-    """End an invitation, of a team if one is given; WrongEntryError if it has none that is good."""
-    code = next((one for one in invitations(session, at, team_id) if one.id == number), None)
+def revoke_invitation(
+    session: Session, number: int, at: float, team_id: int | None = None, made_by: Account | None = None
+) -> None:
+    """End one of `invitations`; WrongEntryError if there is none of this number."""
+    code = next((one for one in invitations(session, at, team_id, made_by) if one.id == number), None)
     if code is None:
         raise WrongEntryError("invitation: unknown, used or expired")
     code.used = at
@@ -149,6 +167,7 @@ def _register(session: Session, code: str, name: str, password: str, team: str, 
         password=password,
         role=invitation.role or PARTICIPANT,
         team_id=invitation.team_id,
+        competition_id=invitation.competition_id,
         created=at,
     )
     session.add(account)
@@ -235,7 +254,7 @@ def remove(session: Session, account: Account, at: float) -> None:
         token.revoked = at
         token.name = "removed"
     account.name, account.password = f"removed {account.id}", "none"
-    account.removed, account.role = at, PARTICIPANT
+    account.removed, account.role, account.competition_id = at, PARTICIPANT, None
     account.epoch += 1
 
 

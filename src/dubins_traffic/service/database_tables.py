@@ -41,7 +41,10 @@ class Team(Base):
 
 
 class Account(Base):
-    """A person. A removed account keeps its number, and nothing of the person; `epoch` ends older log-ins."""
+    """A person. A removed account keeps its number, and nothing of the person; `epoch` ends older log-ins.
+
+    `competition_id` is the one competition that an organiser organises, None for all.
+    """
 
     __tablename__ = "account"
     id: Mapped[int] = mapped_column(primary_key=True)
@@ -49,16 +52,19 @@ class Account(Base):
     password: Mapped[str] = mapped_column(Text)
     role: Mapped[str] = mapped_column(String(20))
     team_id: Mapped[int | None] = mapped_column(ForeignKey("team.id"))
+    competition_id: Mapped[int | None] = mapped_column(ForeignKey("competition.id"))
     epoch: Mapped[int] = mapped_column(default=0)
     created: Mapped[float]
     removed: Mapped[float | None]
     team: Mapped[Team | None] = relationship(back_populates="accounts")
+    competition: Mapped[Competition | None] = relationship(lazy="joined")
 
 
 class Code(Base):
     """A code of an invitation or of a new password, by its SHA-256; it is good once, until it expires.
 
-    `account_id` is whose password it is for, `made_by` who invites; `used` is also when it was revoked.
+    `account_id` is whose password it is for, `made_by` who invites; `used` is also when it was revoked. The competition
+    is that of an organiser of one.
     """
 
     __tablename__ = "code"
@@ -68,6 +74,7 @@ class Code(Base):
     role: Mapped[str | None] = mapped_column(String(20))
     team_id: Mapped[int | None] = mapped_column(ForeignKey("team.id"))
     account_id: Mapped[int | None] = mapped_column(ForeignKey("account.id"))
+    competition_id: Mapped[int | None] = mapped_column(ForeignKey("competition.id"))
     made_by: Mapped[int | None] = mapped_column(ForeignKey("account.id"))
     expires: Mapped[float]
     used: Mapped[float | None]
@@ -106,6 +113,7 @@ class Announcement(Base):
     at: Mapped[float]
     title: Mapped[str] = mapped_column(Text)
     text: Mapped[str] = mapped_column(Text)
+    competition: Mapped[Competition] = relationship()
 
 
 class Phase(Base):

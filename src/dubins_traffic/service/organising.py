@@ -217,15 +217,20 @@ def announce(
     note(session, by, "announce", row.slug, title.strip(), at)
 
 
-def retract(service: Service, session: Session, number: int, by: Account) -> str:
-    """Take an announcement back, and return the address of its competition; WrongEntryError if there is none."""
+def announced(session: Session, number: int, by: Account) -> Announcement:
+    """Return an announcement of a competition that somebody organises; UnknownError if there is none."""
     row = numbered(session, Announcement, number)
-    if row is None:
-        raise WrongEntryError("no such announcement")
+    if row is None or not viewing.organises(by, row.competition_id):
+        raise receiving.UnknownError("no such announcement")
+    return row
+
+
+def retract(service: Service, session: Session, number: int, by: Account) -> str:
+    """Take an announcement back, and return the address of its competition; UnknownError if there is none."""
+    row = announced(session, number, by)
     session.delete(row)
-    slug = session.get_one(Competition, row.competition_id).slug
-    note(session, by, "retract", slug, row.title, service.clock())
-    return slug
+    note(session, by, "retract", row.competition.slug, row.title, service.clock())
+    return row.competition.slug
 
 
 def reveal(service: Service, session: Session, phase: Phase, by: Account) -> None:

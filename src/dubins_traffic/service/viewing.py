@@ -12,6 +12,7 @@ from sqlalchemy.orm import Session
 from dubins_traffic.competition.ranking import value
 from dubins_traffic.competition.visibility import SubmissionState, visible
 from dubins_traffic.service import standings, submissions
+from dubins_traffic.service.accounts import ORGANISER
 from dubins_traffic.service.database_tables import (
     Account,
     Announcement,
@@ -34,26 +35,28 @@ def iso(at: float | None) -> str | None:
     return None if at is None else datetime.fromtimestamp(at, UTC).strftime("%Y-%m-%dT%H:%M:%SZ")
 
 
-def is_organiser(account: Account | None) -> bool:
-    """Whether somebody may see everything."""
-    return account is not None and account.role == "organiser"
+def organises(account: Account | None, competition_id: int) -> bool:
+    """Whether somebody may see everything of a competition."""
+    if account is None or account.role != ORGANISER:
+        return False
+    return account.competition_id in (None, competition_id)
 
 
 def owns(account: Account | None, submission: Submission) -> bool:
     """Whether a submission is of somebody's team, or somebody is an organiser."""
     if account is None:
         return False
-    return is_organiser(account) or account.team_id == submission.team_id
+    return organises(account, submission.phase.competition_id) or account.team_id == submission.team_id
 
 
 def sees_table(row: Phase, account: Account | None, at: float) -> bool:
     """Whether somebody may see the table of a phase now."""
-    return row.shows != "nothing" or row.is_closed(at) or is_organiser(account)
+    return row.shows != "nothing" or row.is_closed(at) or organises(account, row.competition_id)
 
 
 def sees_trials(row: Phase, account: Account | None, submission: Submission, at: float) -> bool:
     """Whether somebody may see the trials of a submission and their replays now."""
-    if is_organiser(account):
+    if organises(account, row.competition_id):
         return True
     if row.shows != "all" and not row.is_closed(at):
         return False
@@ -102,7 +105,7 @@ def _places_in(
     """Return a table of a phase that somebody may see now: whole or rounded, or nothing if there is none yet."""
     if standing is None:
         return []
-    whole = is_organiser(account) or row.is_closed(service.clock())
+    whole = organises(account, row.competition_id) or row.is_closed(service.clock())
     return list(standing.places) if whole else standings.shown_table(service.phase(row), standing)
 
 
@@ -163,7 +166,7 @@ def submission_document(
     results = standings.judged(trials, logs=logs)
     now = datetime.fromtimestamp(service.clock(), UTC)
     phase = service.phase(row)
-    if is_organiser(account):
+    if organises(account, row.competition_id):
         open_model = phase.model.model_copy(update={"shows": "all"})
         phase = type(phase)(phase.name, open_model, phase.configurations, phase.ranking, phase.folder)
     secret = phase.shows == "nothing" and not phase.is_closed(now)

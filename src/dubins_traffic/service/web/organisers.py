@@ -63,6 +63,7 @@ FOLLOWS = {
     "counts in its stead, if there is one. It can be let in again.",
     "readmit": "The submission counts again as any other, for no reason to disqualify it is given.",
     "rejudge": "All its trials are run again, and the results so far no longer count; the database keeps them.",
+    "retract": "It goes from the page and from the feed; who has read it has read it, and the log keeps its title.",
     "remove": "Name, password and tokens are deleted, and open invitations to the team and by the person end. "
     "Submissions stay with the team. It can't be undone.",
 }
@@ -76,7 +77,7 @@ class Organisers(Controller):
     include_in_schema = False
     guards = [requests.organiser]  # noqa: RUF012
 
-    @get("/", sync_to_thread=True)
+    @get("/", sync_to_thread=True, opt={requests.OWN: True})
     def desk(self, service: ServiceHere, viewer: ViewerHere) -> Template:
         """Show the desk."""
         return _shown(service, viewer)
@@ -92,22 +93,25 @@ class Organisers(Controller):
         made = organising.create(service, data.address, _given(data.files), viewer.person)
         return Redirect(f"/desk/c/{made.slug}", status_code=303)
 
-    @post("/invite", sync_to_thread=True, status_code=200)
+    @post("/invite", sync_to_thread=True, status_code=200, opt={requests.OWN: True})
     def invite(self, service: ServiceHere, viewer: ViewerHere, data: Given) -> Template:
         """Show a new invitation."""
         role = data.get("role", accounts.PARTICIPANT)
         if role not in accounts.ROLES:
             raise WrongEntryError("role: participant or organiser")
+        slug = data.get("competition", "") if viewer.competition is None else viewer.competition.slug
         with service.database.writing() as session:
-            code = accounts.invite(session, role, None, service.clock(), by=viewer.person)
-            accounts.note(session, viewer.person, "invite", role, "", service.clock())
+            of = receiving.competition_named(session, slug) if slug and role == accounts.ORGANISER else None
+            code = accounts.invite(session, role, None, service.clock(), by=viewer.person, organises=of)
+            what = role if of is None else f"{role} of {slug}"
+            accounts.note(session, viewer.person, "invite", what, "", service.clock())
         return _shown(service, viewer, code=code)
 
-    @post("/invitations/{number:int}/revoke", sync_to_thread=True)
+    @post("/invitations/{number:int}/revoke", sync_to_thread=True, opt={requests.OWN: True})
     def revoke_invitation(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
-        """Revoke an invitation, whoever has made it."""
+        """Revoke an invitation, whoever has made it; an organiser of one competition only the own ones."""
         with service.database.writing() as session:
-            accounts.revoke_invitation(session, number, service.clock())
+            accounts.revoke_invitation(session, number, service.clock(), made_by=_maker(viewer))
             accounts.note(
                 session, viewer.person, "revoke invitation", f"invitation {number}", "", service.clock()
             )
@@ -223,7 +227,15 @@ class Organisers(Controller):
             )
         return Redirect(f"/c/{slug}", status_code=303)
 
-    @post("/retract/{number:int}", sync_to_thread=True)
+    @get("/retract/{number:int}", sync_to_thread=True, opt={requests.OWN: True})
+    def ask_to_retract(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Template:
+        """Ask whether an announcement is to be taken back."""
+        with service.database.reading() as session:
+            row = organising.announced(session, number, viewer.person)
+            title, back = f"Retract {row.title}", f"/desk/c/{row.competition.slug}"
+        return asked(service, viewer, f"/desk/retract/{number}", title, FOLLOWS["retract"], back=back)
+
+    @post("/retract/{number:int}", sync_to_thread=True, opt={requests.OWN: True})
     def retract(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int]) -> Redirect:
         """Take an announcement back."""
         with service.database.writing() as session:
@@ -285,7 +297,7 @@ class Organisers(Controller):
         headers = {"content-disposition": f'attachment; filename="{slug}-site.zip"'}
         return Response(data, media_type="application/zip", headers=headers)
 
-    @get("/s/{number:int}/{act:str}", sync_to_thread=True)
+    @get("/s/{number:int}/{act:str}", sync_to_thread=True, opt={requests.OWN: True})
     def ask_of_submission(
         self,
         service: ServiceHere,
@@ -298,13 +310,13 @@ class Organisers(Controller):
         if act not in ("rejudge", "disqualify"):
             raise UnknownError("no such act")
         with service.database.reading() as session:
-            slug = receiving.submission_numbered(session, number, viewer.person).phase.competition.slug
+            slug = _submission(session, number, viewer).phase.competition.slug
         told = "readmit" if act == "disqualify" and not why.strip() else act
         title = f"{told.capitalize()} submission {number}"
         where, back = f"/desk/s/{number}/{act}", f"/desk/c/{slug}"
         return asked(service, viewer, where, title, FOLLOWS[told], back=back, why=why)
 
-    @post("/s/{number:int}/{act:str}", sync_to_thread=True)
+    @post("/s/{number:int}/{act:str}", sync_to_thread=True, opt={requests.OWN: True})
     def submission(
         self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], act: FromPath[str], data: Given
     ) -> Redirect:
@@ -313,9 +325,7 @@ class Organisers(Controller):
         if act not in acts:
             raise UnknownError("no such act")
         with service.database.writing() as session:
-            row = numbered(session, Submission, number)
-            if row is None:
-                raise UnknownError("no such submission")
+            row = _submission(session, number, viewer)
             acts[act](service, session, row, viewer.person, data.get("why", ""))
             slug = row.phase.competition.slug
         return Redirect(f"/desk/c/{slug}", status_code=303)
@@ -349,13 +359,27 @@ def _account(session: viewing.Session, number: int) -> Account:
     return account
 
 
+def _submission(session: viewing.Session, number: int, viewer: Viewer) -> Submission:
+    """Return a submission to a competition that somebody organises; UnknownError if there is none."""
+    row = numbered(session, Submission, number)
+    if row is None or not viewing.organises(viewer.person, row.phase.competition_id):
+        raise UnknownError("no such submission")
+    return row
+
+
+def _maker(viewer: Viewer) -> Account | None:
+    """Return of whom alone somebody sees the invitations: organisers of one competition of themselves."""
+    return None if viewer.competition is None else viewer.person
+
+
 def _shown(service: Service, viewer: Viewer, **secret: Any) -> Template:
     with service.database.reading() as session:
-        competitions = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
+        rows = session.scalars(select(Competition).order_by(Competition.id.desc())).all()
+        competitions = [row for row in rows if viewer.organises(row.slug)]
         people = session.scalars(select(Account).where(Account.removed.is_(None)).order_by(Account.id)).all()
         teams = {team.id: team.name for team in session.scalars(select(Team))}
         workers = accounts.worker_tokens(session)
-        invitations = accounts.invitations(session, service.clock())
+        invitations = accounts.invitations(session, service.clock(), made_by=_maker(viewer))
         unjudged = [f"{row.competition.slug}/{row.name}" for row in service.waiting_for_key(session)]
     given = {"code": "", "token": "", "reset": "", **secret}
     return page(

@@ -16,7 +16,7 @@ from litestar.types import ASGIApp, HTTPReceiveMessage, Receive, Scope, Send
 from litestar.types.asgi_types import WebSocketReceiveMessage
 
 from dubins_traffic.service import accounts
-from dubins_traffic.service.database_tables import Account, Team
+from dubins_traffic.service.database_tables import Account, Competition, Team
 from dubins_traffic.service.service import Service
 
 ServiceHere = NamedDependency[Service]
@@ -37,8 +37,17 @@ class Viewer:
 
     @property
     def organiser(self) -> bool:
-        """Whether this is an organiser."""
+        """Whether this is an organiser, of one competition or of all."""
         return self.account is not None and self.account.role == accounts.ORGANISER
+
+    @property
+    def competition(self) -> Competition | None:
+        """The one competition that an organiser organises, None for all."""
+        return None if self.account is None else self.account.competition
+
+    def organises(self, slug: str) -> bool:
+        """Whether this is an organiser of a competition."""
+        return self.organiser and (self.competition is None or self.competition.slug == slug)
 
     @property
     def person(self) -> Account:
@@ -99,11 +108,19 @@ def person(connection: Asked, _handler: BaseRouteHandler) -> None:
         raise NotAuthorizedException("log in first")
 
 
+OWN = "checks_what_is_organised"
+"""Option of the routes at the desk that name no competition, and of which organisers of one see what is of that."""
+
+
 def organiser(connection: Asked, handler: BaseRouteHandler) -> None:
-    """Let in organisers."""
+    """Let in organisers; those of one competition where it is named, and where the route says that it minds that."""
     person(connection, handler)
-    if not connection.user.organiser:
+    viewer: Viewer = connection.user
+    slug = connection.path_params.get("slug")
+    if not viewer.organiser or (slug is not None and not viewer.organises(slug)):
         raise PermissionDeniedException("this is for organisers")
+    if slug is None and viewer.competition is not None and not handler.opt.get(OWN):
+        raise PermissionDeniedException("this is for organisers of all competitions")
 
 
 def worker(connection: Asked, _handler: BaseRouteHandler) -> None:
