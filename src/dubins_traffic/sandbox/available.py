@@ -54,6 +54,13 @@ def held(layers: Layers) -> Iterator[tuple[str, str]]:
         "buffers of pipes, sockets",
         f"{group}: memory" if MEMORY in layers else "their number is watched" if SECCOMP in layers else "",
     )
+    yield "page tables, own files", f"{group}: memory" if MEMORY in layers else box and "watched, in that sum"
+    yield (
+        "all else in the kernel",
+        f"{group}: memory"
+        if MEMORY in layers
+        else "not held: what its processes, threads and open files take, whose number is",
+    )
     yield "processes", f"{group}: pids, and RLIMIT_NPROC" if PROCESSES in layers else box and "RLIMIT_NPROC"
     yield "processor time", f"{group}: its clock" if CLOCK in layers else "the clocks of its processes"
     yield "wall clock, lines, output", "this process"

@@ -72,8 +72,11 @@ class ProcessClocks:
         self._seconds = max(self._seconds, total)
         self.memory, self.processes = memory, seen
 
-    def buffers(self) -> int:
-        """Return how many bytes the kernel holds at most in the pipes and sockets of the processes of the last look."""
+    def kernel(self) -> int:
+        """Return how many bytes the kernel holds for the processes of the last look.
+
+        These are their page tables, and the most that their pipes and sockets may hold.
+        """
         kernel_objects: set[str] = set()
         unseen = 0
         for thread in (each for process in self.processes for each in _threads(process)):
@@ -88,7 +91,8 @@ class ProcessClocks:
                 with contextlib.suppress(OSError):
                     kernel_objects.add(str(each.readlink()))
         sockets = unseen + sum(name.startswith("socket:") for name in kernel_objects)
-        return sockets * _socket() + sum(name.startswith("pipe:") for name in kernel_objects) * PIPE
+        pipes = sum(name.startswith("pipe:") for name in kernel_objects)
+        return sockets * _socket() + pipes * PIPE + sum(map(_page_tables, self.processes))
 
 
 def _stat(process: int) -> tuple[float, int] | None:
@@ -120,14 +124,24 @@ def _threads(process: int) -> list[Path]:
         return []
 
 
+def _status(place: Path) -> dict[str, str]:
+    """Return what a process or thread says of itself, by name; nothing if it has ended."""
+    try:
+        lines = (place / "status").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return {}
+    return dict(line.split(":", 1) for line in lines if ":" in line)
+
+
+def _page_tables(process: int) -> int:
+    """Return how many bytes the page tables of a process take; 0 if it has ended."""
+    return int(_status(Path(f"/proc/{process}")).get("VmPTE", "0").split()[0]) << 10
+
+
 def _table(thread: Path) -> int:
     """Return how many descriptors a thread has room for that does not show which it holds; 0 if it has ended."""
-    try:
-        lines = (thread / "status").read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return 0
-    status = dict(line.split(":", 1) for line in lines if ":" in line)
-    return 0 if status["State"].split()[0] in ("Z", "X") else int(status.get("FDSize", "0"))
+    status = _status(thread)
+    return 0 if status.get("State", "X").split()[0] in ("Z", "X") else int(status.get("FDSize", "0"))
 
 
 @cache
@@ -237,17 +251,26 @@ class Processes:
         if self._group is not None and MEMORY in self._layers:
             return self._group.out_of_memory()
         self._clocks.seconds()  # looks at the processes, also where a group's clock counts their time
-        return self._clocks.memory + self._clocks.buffers() > self._limits.memory
+        return self._clocks.memory + self._clocks.kernel() + self._file_bytes() > self._limits.memory
+
+    def _file_bytes(self) -> int:
+        """Return how many bytes the box's own files take, which lie in memory; 0 where that can't be seen."""
+        own = self._filesystem()
+        return 0 if own is None else (own.f_blocks - own.f_bfree) * own.f_frsize
 
     def files(self) -> int:
         """Return how many files the box has of its own, 0 where that can't be seen."""
+        own = self._filesystem()
+        return 0 if own is None else own.f_files - own.f_ffree
+
+    def _filesystem(self) -> os.statvfs_result | None:
+        """Return what there is where the box has its own files."""
         if not self._first:
-            return 0
+            return None
         try:
-            filesystem = os.statvfs(f"/proc/{self._first}/root/tmp")
+            return os.statvfs(f"/proc/{self._first}/root/tmp")
         except OSError:
-            return 0
-        return filesystem.f_files - filesystem.f_ffree
+            return None
 
     def status(self, seconds: float) -> str | None:
         """Return how the first process ended, None if it does not within some `seconds`."""

@@ -135,6 +135,29 @@ for _ in range(40):
         os.write(write, b'.'); time.sleep(600)
 while len(got or '') < 40: got = (got or '') + os.read(read, 1).decode()
 """, alone=False, limits=(("memory", 112 << 20),)),
+    Attack("memory in files of its own", (MEMORY, JUDGE), """
+held = bytearray(b'x' * (40 << 20))
+for name in ('/tmp/big', '/tmp/other'):
+    with open(name, 'wb') as file:
+        for _ in range(40): file.write(bytes(1 << 20)); file.flush()
+time.sleep(1); got = len(held)
+""", alone=False, limits=(("memory", 112 << 20), ("files", 96 << 20))),
+    Attack("memory in page tables", (MEMORY, RLIMITS, JUDGE), """
+import mmap
+read, write = os.pipe()
+for _ in range(16):
+    if os.fork() == 0:
+        try:
+            held = mmap.mmap(-1, 32 << 30, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS | 0x4000)
+            for place in range(0, len(held), 2 << 20): held[place]
+        except OSError: os._exit(0)
+        os.write(write, b'.'); time.sleep(600)
+os.close(write)
+while len(got or '') < 16:
+    said = os.read(read, 1).decode()
+    got = (got or '') + said
+    if not said: raise OSError('none of them was mapped')
+""", alone=False),
     Attack("memory that is locked", (RLIMITS,), "place = ctypes.create_string_buffer(8 << 20); call(149, place, 8 << 20); got = 'locked'", alone=False),
     Attack("processes", (PROCESSES, RLIMITS), FORKS),
     Attack("threads", (PROCESSES, RLIMITS), """
