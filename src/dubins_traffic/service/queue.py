@@ -15,13 +15,12 @@ from sqlalchemy import func, or_, select, update
 from sqlalchemy.orm import Session
 
 from dubins_traffic.errors import DubinsTrafficError
+from dubins_traffic.service.database import numbered
 from dubins_traffic.service.database_tables import Chunk, Submission, Team
 
 ATTEMPTS = 5
 """So many leases of a chunk may end without a result; then its submission fails, by our fault."""
 
-LARGEST = 2**31 - 1
-"""The largest number of a row."""
 FIRST_PAUSE_S = 0.5
 """Half of how long a chunk waits after the first lease without a result, seconds; twice as long after the next."""
 
@@ -114,7 +113,7 @@ def held(session: Session, chunk_id: int, token: int) -> Chunk:
 
     StaleLeaseError if the lease has ended: it ran out and another has it, or the work was cancelled.
     """
-    chunk = session.get(Chunk, chunk_id) if chunk_id <= LARGEST else None
+    chunk = numbered(session, Chunk, chunk_id)
     if chunk is None or chunk.state != "leased" or chunk.token != token:
         raise StaleLeaseError(f"chunk {chunk_id}: the lease {token} has ended")
     return chunk
