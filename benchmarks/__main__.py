@@ -2,7 +2,7 @@
 
 Others run if they are named: `overview` is the table of benchmarks/README.md, beside other simulators, which it
 installs first where they are missing (two minutes more), and `peers` its part about these; `first_use` runs with empty
-caches of kernels; `lcm`, `ros1`, `gazebo` and `sandbox` need what they are called after; `service` and
+caches of kernels; `lcm`, `ros1`, `gazebo` and `sandbox` need what they are called after; `service`, an hour, and
 `first_submission` run a service, `campaign` 300,000 short trials, also on Ray, and `scale` a world of 10,000 cars.
 What trials show of drivers, rules and searches is in `experiments`.
 """

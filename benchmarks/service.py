@@ -1,14 +1,13 @@
 """`python -m benchmarks.service [SECONDS]`: pages for 50 readers while two workers judge, on SQLite; the fair queue.
 
 A reader opens a page, reads for about a second, and opens the next. `a page without a pause` is how many pages a second
-the server can give to readers that never pause.
+the server can give to readers that never pause. Then a season is held (`benchmarks.season`), which takes an hour.
 """
 
 from __future__ import annotations
 
 import asyncio
 import itertools
-import os
 import random
 import sys
 import tempfile
@@ -20,6 +19,8 @@ import httpx
 import numpy as np
 from tests.services import CIRCLING, STANDING, Person, Service, competition_text, serving
 
+from benchmarks import season
+from benchmarks.season import processor_s
 from benchmarks.table import Row, show
 from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, queue, submissions
@@ -71,12 +72,6 @@ def busy(service: Service) -> tuple[Person, list[str]]:
         person.submit("short/practice", f"{CIRCLING}\n# {k}")
     pages = ["/", "/c/short", "/c/short/practice", "/c/short/practice/table", "/status", f"/s/{first}"]
     return people[0], [*pages, f"/s/{first}/live", f"/s/{first}/trials/0", f"/s/{first}/trials/0/replay"]
-
-
-def processor_s(process: int) -> float:
-    """Return the processor time that a process has used, without that of its children."""
-    fields = Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 def pages(seconds: float) -> tuple[list[float], float, float]:
@@ -139,6 +134,7 @@ def measure(seconds: float = SECONDS) -> list[Row]:
         Row("processor time of the server a page", f"{each * 1e3:.1f} ms", "no bar", True),
         Row("pages without a pause", f"{unpaused:.0f} a second", "no bar", True),
         Row(f"chunks before another's first, {QUEUED} queued", str(before), "at most 1", before <= 1),
+        *season.measure(),
     ]
 
 
