@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.cars.state import Frames, Observation
 from dubins_traffic.learning.flat import FlatObserver
@@ -37,6 +37,15 @@ class TrialView:
         self._group, self._row = group, row
         self.instance: Instance = group.instances[row]
         self._state, self._labels = group.of_trial(row)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what is copied: not what shows a part of the group's arrays, which a copy has of its own group."""
+        return {name: own for name, own in self.__dict__.items() if name not in ("_state", "_labels")}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Be a copy."""
+        self.__dict__.update(state)
+        self._state, self._labels = self._group.of_trial(self._row)
 
     @cached_property
     def _senses(self) -> Senses:

@@ -120,8 +120,6 @@ class MultiAgentTrials:
 
     Attributes
     ----------
-    terms : (B, N, T)
-        Terms of `envs.terms` of each car in the last step, but for breaches.
     broken : (B, N, P)
         How often each car has broken each of `PARTS` in the last step, where that counts (`Blame`).
     stepped_in : (B, N)
@@ -152,7 +150,6 @@ class MultiAgentTrials:
         board: dict[str, Any] = Board(len(each), settings).arrays
         self._steps = StepTables(stride=table(Stride, len(each)), **board)
         self._flat, self._told = board["flat"], np.zeros((len(each), len(NAMES)), dtype=np.float32)
-        self.terms: Floats = board["terms"].reshape(trials, places, -1)
         self.broken: Ints = np.zeros((trials, places, len(PARTS)), dtype=np.int64)
         self.stepped_in: Ints = np.zeros((trials, places), dtype=np.int64)
         self.given: list[Floats] = []
@@ -231,6 +228,11 @@ class MultiAgentTrials:
 
     def _observe(self, trials: Ints) -> None:
         self._tell(self._rows(trials), self.group.state.x.shape[1], self._told, self.outlook, self._steps)
+
+    @property
+    def terms(self) -> Floats:
+        """Terms of `envs.terms` of each car in the last step, but for breaches, (B, N, T)."""
+        return self._steps.terms.reshape(*self.group.state.x.shape, -1)
 
     @property
     def observed(self) -> npt.NDArray[np.float32]:

@@ -1,14 +1,14 @@
 """The trial of each episode: a function of a seed, the environment's number and the episode's number.
 
-Episode k of environment i under the base seed s is trial ``4096 k + i`` of seed s. With a pool of levels its road
-network is that of a level, drawn from the same numbers; all else is drawn as ever.
+Episode k of environment i under the base seed s is trial ``4096 k + i`` of seed s. Environments beyond the first 4,096
+are the first of further seeds, ``s + 0x9E3779B97F4A7C15 j mod 2**64``, j = 1, 2, ... With a pool of levels the road
+network of an episode is that of a level, drawn from the same numbers; all else is drawn as ever.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from typing import TYPE_CHECKING, Any, Final, cast
 
 import numpy as np
@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 MOST_ENVS: Final = 4096
 """Most environments that have trials of their own under one seed."""
+APART: Final = 0x9E3779B97F4A7C15
+"""How far the seeds of blocks of `MOST_ENVS` environments are apart, modulo 2**64: an odd number, as in SplitMix64."""
 TEST: Final = 1 << 31
 """Levels to train on are drawn as trials from 0 on, those to test on as trials from here on."""
 LEVEL_DRAW: Final = 260
@@ -78,7 +80,7 @@ class Episodes:
     def __init__(self, configuration: Configuration, levels: Levels | None = None) -> None:
         self.configuration = configuration
         self._levels = levels
-        self._level = cache(self._drawn)
+        self._drawn: dict[int, Configuration] = {}
 
     def draw(self, wanted: Iterable[tuple[int, int, int]]) -> list[Instance]:
         """Return the trials of some episodes, each given by base seed, environment and number."""
@@ -102,12 +104,15 @@ class Episodes:
         chosen = below(np.uint64(seed), trial, 0, 0, LEVEL_DRAW, self._levels.count)
         return int(chosen) + (TEST if self._levels.split == "test" else 0)
 
-    def _drawn(self, level: int) -> Configuration:
-        """Return the configuration with the network of a level."""
+    def _level(self, level: int) -> Configuration:
+        """Return the configuration with the network of a level, which is drawn once."""
+        if level in self._drawn:
+            return self._drawn[level]
         seed = 0 if self._levels is None else self._levels.seed
         network = draw(self.configuration, seed, level).problem.network
         settings = self.configuration.settings.model_copy(update={"network": None})
-        return replace(self.configuration, settings=settings, network=network)
+        self._drawn[level] = replace(self.configuration, settings=settings, network=network)
+        return self._drawn[level]
 
 
 def trial_of(env: int, episode: int) -> int:
@@ -126,7 +131,10 @@ def trial_of(env: int, episode: int) -> int:
 def seeds_of(seed: int | Sequence[int | None], envs: int) -> list[tuple[int, int]]:
     """Return the base seed and number of each environment: i under one seed for all, 0 under seeds of their own."""
     if isinstance(seed, int | np.integer):
-        return [(int(seed), env) for env in range(envs)]
+        places = (divmod(env, MOST_ENVS) for env in range(envs))
+        return [
+            ((int(seed) + APART * block) % limits.SEEDS if block else int(seed), env) for block, env in places
+        ]
     if len(seed) != envs:
         raise InputError(
             "not one seed for each environment", field="seed", value=len(seed), expected=str(envs)

@@ -28,13 +28,17 @@ if TYPE_CHECKING:
 
 Bools = npt.NDArray[np.bool_]
 VECTORIZED: Final = ("flat", "dict")
+TOGETHER: Final = ("close", "reset", "step")
+"""What is done to all environments at once."""
 
 
 class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
     """A number of environments, each like `envs.single.TrafficEnv`, stepped by compiled code.
 
-    Episode k of environment i under the seed s is trial ``4096 k + i`` of seed s, whatever `num_envs`. Infos are
-    arrays, (E,); those that only some environments have come with a mask, (E,), whose name begins with ``_``.
+    Episode k of environment i under the seed s is trial ``4096 k + i`` of seed s, whatever `num_envs`; of more than
+    4,096 environments the others have further seeds (`envs.episodes`). A copy, by `pickle` too, goes on as this one
+    does. Infos are arrays, (E,); those that only some environments have come with a mask, (E,), whose name begins with
+    ``_``.
 
     Parameters
     ----------
@@ -166,6 +170,32 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         else:
             info |= last
         return self._observed(), rewards, terminated, over & ~terminated, info
+
+    def call(self, name: str, *args: Any, **kwargs: Any) -> tuple[Any, ...]:
+        """Return what a method or attribute gives for each environment, (E,).
+
+        These are ``render``, ``trial``, the instance of the present episode, and what the environments have in common.
+
+        Raises
+        ------
+        AttributeError
+            If there is no such thing.
+        DubinsTrafficError
+            If it acts on all environments at once.
+        """
+        if name in TOGETHER:
+            raise DubinsTrafficError(
+                f"{name}: acts on all environments at once: call it on the vector environment"
+            )
+        if name == "trial":
+            return tuple(self.fleet.instance(env) for env in range(self.num_envs))
+        found = getattr(self, name)
+        value: Any = found(*args, **kwargs) if callable(found) else found
+        return value if name == "render" and value is not None else (value,) * self.num_envs
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute of each environment, as `call` does."""
+        return self.call(name)
 
     def commands(self, actions: Any) -> Floats:
         """Return the commands, (K, 2), speed in m/s and yaw rate in rad/s, of each tick of one environment's steps."""
