@@ -2,6 +2,7 @@
 
 import json
 import os
+import random
 import shutil
 import signal
 import subprocess
@@ -9,7 +10,10 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
+from select import select
+from threading import Event, Thread
 
 import pytest
 
@@ -27,7 +31,7 @@ pytestmark = pytest.mark.tools
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 PATIENT = ("--lockstep", "--deadline", "600", "--begin", "600")
-"""In lockstep what is not answered is sent again each second: a lost message ends no trial, a busy machine might."""
+"""In lockstep what is not answered is sent again: a lost message ends no trial, a busy machine might."""
 PYTHON = [sys.executable, str(ROOT / "examples" / "lcm" / "controller.py")]
 UNHURRIED = [
     sys.executable,
@@ -112,6 +116,55 @@ def test_controllers_in_python_and_c_drive_equal_trials(in_c: str, tmp_path: Pat
         assert record.controller == "lcm"
     assert made[0] == made[1]
     assert len(made[0]) == 2
+
+
+@contextmanager
+def losing(one: str, other: str, share: float) -> Iterator[list[str]]:
+    """Carry messages between two URLs and lose a share of them each way; yields the channels of those lost."""
+    over, chance, lost = Event(), random.Random(1), []
+    session, driver = library.LCM(one), library.LCM(other)
+
+    def carry(to: library.LCM, channel: str, data: bytes) -> None:
+        if chance.random() < share:
+            lost.append(channel)
+        else:
+            to.publish(channel, data)
+
+    session.subscribe("TRAFFIC_(INSTANCE|STATE_.*|END|GRANT)", partial(carry, driver))
+    driver.subscribe("TRAFFIC_(COMMAND_.*|MODE)", partial(carry, session))
+
+    def relay() -> None:
+        while not over.is_set():
+            for heard in select([session.fileno(), driver.fileno()], [], [], 0.1)[0]:
+                (session if heard == session.fileno() else driver).handle_timeout(0)
+
+    thread = Thread(target=relay)
+    thread.start()
+    try:
+        yield lost
+    finally:
+        over.set()
+        thread.join()
+
+
+def test_lost_messages_cost_little_and_end_no_trial(
+    url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Ten seconds in two trials take at most twice as long: one answer in five needs a frame sent again."""
+    config = tmp_path / "short.json"
+    config.write_text(json.dumps(dt.load_config("demo").to_document() | {"duration_bounds": [5, 5]}))
+    monkeypatch.setenv("LCM_DEFAULT_URL", other := free_url())
+    with losing(url, other, 0.1) as lost, running(*PYTHON):
+        options = (*PATIENT, "--trials", "2", "--records", str(tmp_path), "--url", url, "--json")
+        with running(COMMAND, "lcm", "run", str(config), *options) as session:
+            status, out, err = ended(session)
+    assert status == 0, err
+    assert [trial["end"] for trial in json.loads(out)["trials"]] == ["duration"] * 2
+    assert lost.count("TRAFFIC_STATE_ego") > 10
+    assert lost.count("TRAFFIC_COMMAND_ego") > 10
+    acts = [json.loads(path.read_text())["act_s"] for path in tmp_path.glob("*.wall.json")]
+    assert [act["count"] for act in acts] == [150, 150]
+    assert sum(act["mean"] * act["count"] for act in acts) < 20.0
 
 
 def test_an_ego_elsewhere_drives_under_the_shield(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from collections.abc import Callable, Generator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from time import monotonic
-from typing import TYPE_CHECKING, Any, Self
+from typing import TYPE_CHECKING, Any, Protocol, Self, runtime_checkable
 
 import numpy as np
 
@@ -47,6 +47,16 @@ IDLE = 0.1
 AGAIN = 1.0
 """Seconds after which a frame that nobody answers is sent again, where answers say what they answer."""
 NEVER_BY_ITSELF = 1e9
+
+
+@runtime_checkable
+class Loses(Protocol):
+    """A tagged transport that may lose messages.
+
+    It says after how many seconds a frame is sent again first; each further wait is twice as long, to a second.
+    """
+
+    again: float
 
 
 class Link:
@@ -286,6 +296,7 @@ class Link:
             if self._streams(still) and now >= self._next_view:
                 self._show(onward(self._state, self._elapsed(now)), self._elapsed(now), now)
             if now >= sent_again or (again < math.inf and inbox.returned > self._returned):
+                again = max(again, min(2.0 * again, AGAIN))
                 sent_again = now + again
                 self._returned, self._repeated = inbox.returned, True
                 self._send_again()
@@ -298,7 +309,7 @@ class Link:
         if not self._running or (self._moving and not self.clock.lockstep):
             return math.inf
         if self.transport.tagged:
-            return AGAIN
+            return self.transport.again if isinstance(self.transport, Loses) else AGAIN
         return IDLE if self._tick == 0 else NEVER_BY_ITSELF
 
     def _check(self, car: str | None) -> None:

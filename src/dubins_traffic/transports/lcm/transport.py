@@ -54,6 +54,7 @@ class Lcm:
 
     name = "lcm"
     tagged = True
+    again = 0.05
 
     def __init__(self, url: str | None = None, maestro: Maestro | None = None) -> None:
         self.url = url or connection.usual_url()
