@@ -147,24 +147,32 @@ def losing(one: str, other: str, share: float) -> Iterator[list[str]]:
         thread.join()
 
 
-def test_lost_messages_cost_little_and_end_no_trial(
-    url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Ten seconds in two trials take at most twice as long: one answer in five needs a frame sent again."""
-    config = tmp_path / "short.json"
+def driven(folder: Path, share: float, monkeypatch: pytest.MonkeyPatch) -> tuple[float, list[str]]:
+    """Return how long a driver was waited for in two trials of 150 ticks, a share of messages lost, and those lost."""
+    folder.mkdir()
+    config = folder / "short.json"
     config.write_text(json.dumps(dt.load_config("demo").to_document() | {"duration_bounds": [5, 5]}))
-    monkeypatch.setenv("LCM_DEFAULT_URL", other := free_url())
-    with losing(url, other, 0.1) as lost, running(*PYTHON):
-        options = (*PATIENT, "--trials", "2", "--records", str(tmp_path), "--url", url, "--json")
+    url, other = free_url(), free_url()
+    monkeypatch.setenv("LCM_DEFAULT_URL", other)
+    with losing(url, other, share) as lost, running(*PYTHON):
+        options = (*PATIENT, "--trials", "2", "--records", str(folder), "--url", url, "--json")
         with running(COMMAND, "lcm", "run", str(config), *options) as session:
             status, out, err = ended(session)
     assert status == 0, err
     assert [trial["end"] for trial in json.loads(out)["trials"]] == ["duration"] * 2
+    acts = [json.loads(path.read_text())["act_s"] for path in folder.glob("*.wall.json")]
+    assert [act["count"] for act in acts] == [150, 150]
+    return sum(act["mean"] * act["count"] for act in acts), lost
+
+
+def test_lost_messages_cost_little_and_end_no_trial(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lost message costs less than half a second, where it cost a whole one, whatever else this machine does."""
+    quiet, none = driven(tmp_path / "quiet", 0.0, monkeypatch)
+    lossy, lost = driven(tmp_path / "lossy", 0.1, monkeypatch)
+    assert none == []
     assert lost.count("TRAFFIC_STATE_ego") > 10
     assert lost.count("TRAFFIC_COMMAND_ego") > 10
-    acts = [json.loads(path.read_text())["act_s"] for path in tmp_path.glob("*.wall.json")]
-    assert [act["count"] for act in acts] == [150, 150]
-    assert sum(act["mean"] * act["count"] for act in acts) < 20.0
+    assert lossy < 3.0 * quiet + 0.5 * len(lost)
 
 
 def test_an_ego_elsewhere_drives_under_the_shield(tmp_path: Path) -> None:
