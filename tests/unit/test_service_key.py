@@ -14,6 +14,7 @@ from dubins_traffic.competition.competition import Quota
 from dubins_traffic.service import accounts, housekeeping, organising, queue, receiving, submissions, viewing
 from dubins_traffic.service.database_tables import Account, Phase, Submission
 from dubins_traffic.service.service import NoKeyError, Service
+from dubins_traffic.service.serving import prepare
 from dubins_traffic.service.submissions import Upload
 from dubins_traffic.service.web.app import create_app
 from tests.services import competition_text
@@ -140,3 +141,18 @@ def test_a_worker_is_given_the_seed_of_one_trial_of_its_lease(service: Service) 
         assert client.post(f"{where}/{beyond}/seed", json=held).status_code == 404
         stale = {"token": lease["token"] + 1}
         assert client.post(f"{where}/{lease['numbers'][0]}/seed", json=stale).status_code == 409
+
+
+def test_while_nobody_organises_all_the_first_organiser_is_invited(service: Service) -> None:
+    """Whoever organises one competition can't make another one, nor an organiser of all."""
+    first = prepare(service, [], "http://here")
+    assert first is not None
+    with service.database.writing() as session:
+        short = receiving.competition_named(session, "short")
+        code = accounts.invite(session, accounts.ORGANISER, None, NOW, organises=short)
+    accounts.join(service.database, code, "Odo", "correct horse", "", NOW)
+    again = prepare(service, [], "http://here")
+    assert again is not None
+    assert again != first
+    accounts.join(service.database, again.partition("code=")[2], "Olga", "correct horse", "", NOW)
+    assert prepare(service, [], "http://here") is None

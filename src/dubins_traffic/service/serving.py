@@ -37,7 +37,7 @@ def prepare(service: Service, competitions: list[Path], url: str) -> str | None:
     Returns
     -------
     str or None
-        The address at which the first organiser joins, while there is none.
+        The address at which the first organiser of all competitions joins, while there is none.
 
     Raises
     ------
@@ -59,11 +59,15 @@ def prepare(service: Service, competitions: list[Path], url: str) -> str | None:
         else:
             _say_changes(service, slug, path)
     with service.database.writing() as session:
-        organisers = select(func.count()).where(Account.role == accounts.ORGANISER, Account.removed.is_(None))
-        if session.scalar(organisers):
+        of_all = (
+            Account.role == accounts.ORGANISER,
+            Account.competition_id.is_(None),
+            Account.removed.is_(None),
+        )
+        if session.scalar(select(func.count()).where(*of_all)):
             return None
-        unused = update(Code).where(Code.role == accounts.ORGANISER, Code.used.is_(None))
-        session.execute(unused.values(used=service.clock()))
+        offered = Code.role == accounts.ORGANISER, Code.competition_id.is_(None), Code.used.is_(None)
+        session.execute(update(Code).where(*offered).values(used=service.clock()))
         code = accounts.invite(session, accounts.ORGANISER, None, service.clock())
     return f"{service.settings.url.rstrip('/') or url}/join?code={code}"
 
