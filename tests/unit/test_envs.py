@@ -19,13 +19,13 @@ from dubins_traffic import load_config
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.controllers.scripted import Scripted
 from dubins_traffic.envs import NAMES
-from dubins_traffic.envs.channel import with_formulas
 from dubins_traffic.envs.episodes import Episodes, Levels
 from dubins_traffic.envs.parallel import TrafficParallelEnv
 from dubins_traffic.envs.terms import COSTS, TERMS
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.learning.flat import FlatObserver
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.verification.worlds import with_formulas
 from tests.environments import SHORT, single, vector, weaving
 from tests.unit.test_animate import video_library
 

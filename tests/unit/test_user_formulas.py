@@ -267,6 +267,27 @@ def test_commands_show_them(command: Command, tmp_path: Path) -> None:
     assert '"never is false"' in page
 
 
+def test_formulas_are_asked_of_a_record_that_carries_none(command: Command, tmp_path: Path) -> None:
+    """What is said of them is what is said where the configuration carries them."""
+    live = json.loads(command("run", written(tmp_path, MINE), "--json"))["trials"][0]["formulas"]
+    command("run", written(tmp_path, {}), "--records", str(tmp_path / "out"))
+    kept = str(tmp_path / "out" / "trial-0000.mcap")
+    asked = [word for name, text in MINE.items() for word in ("--formula", f"{name}={text}")]
+    assert json.loads(command("check", kept, "--json", *asked))["records"][0]["formulas"] == live
+    text = command("check", kept, "--formula", "[] on_road_ego")
+    assert re.search(r"\n  \[\] on_road_ego: (presumably true|false since)", text)
+
+
+@pytest.mark.parametrize("wrong", ["[] lefd_ego", "mine=[] (", "a <= b"])
+def test_a_formula_that_can_not_be_asked_is_refused(
+    wrong: str, command: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command("run", written(tmp_path, {}), "--records", str(tmp_path / "out"))
+    assert main(["check", str(tmp_path / "out" / "trial-0000.mcap"), "--formula", wrong]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert f"formulas.{wrong.partition('=')[0] if 'mine' in wrong else wrong}: line 1, column" in line
+
+
 def test_a_problem_without_rules_is_checked_by_its_formulas(command: Command, tmp_path: Path) -> None:
     command("run", written(tmp_path, {"mine": "[] on_road_ego"}, rules=False), "--records", str(tmp_path))
     text = command("check", str(tmp_path / "trial-0000.mcap"))

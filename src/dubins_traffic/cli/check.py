@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json as json_text
+import re
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -15,17 +17,31 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
+    from dubins_traffic.record.reader import Record
     from dubins_traffic.record.sink import Ending
     from dubins_traffic.scoring.score import Score
     from dubins_traffic.scoring.verdict import Verdict
 
-EXAMPLES = options.examples("check out/*.mcap", "check out/trial-0000.mcap --json")
+EXAMPLES = options.examples(
+    "check out/*.mcap",
+    "check out/trial-0000.mcap --json",
+    "check out/*.mcap --formula 'on the road=[] on_road_ego'",
+)
+NAME = re.compile(r"[A-Za-z][\w -]{0,99}")
+"""Name of a formula: what stands before a `=` that is none of the formula's own."""
+FormulaOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--formula", metavar="[NAME=]F", help="A formula that is asked of the records, too; again for more."
+    ),
+]
 
 
 def check(
     records: Annotated[
         list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)
     ],
+    formula: FormulaOption = None,
     json: options.Json = False,
 ) -> None:
     """Judge recorded trials by the rules of the road and by formulas: verdicts, and every breach of every car.
@@ -35,9 +51,14 @@ def check(
     from dubins_traffic.campaign.notice import assumption_notice
     from dubins_traffic.runs.sources import load_record
     from dubins_traffic.scoring.score import ScoreSheet, score
-    from dubins_traffic.verification.worlds import from_poses
+    from dubins_traffic.verification.worlds import from_poses, with_formulas
 
-    read = [(name, from_poses(load_record(name))) for name in records]
+    asked = _formulas(formula or [])
+    read: list[tuple[str, Record]] = []
+    for name in records:
+        record = load_record(name)
+        carrying = with_formulas(record.instance, {**record.instance.problem.formulas, **asked})
+        read.append((name, from_poses(replace(record, instance=carrying))))
     scores = [(name, record.ending, score(record)) for name, record in read]
     if json:
         found = [_document(record, scored) for record, _, scored in scores]
@@ -46,6 +67,16 @@ def check(
         for record, ending, scored in scores:
             _show(shown(record), ending, scored)
     faults.warn(assumption_notice(*ScoreSheet(tuple(scored for *_, scored in scores)).assumption_broken))
+
+
+def _formulas(given: list[str]) -> dict[str, str]:
+    """Return formulas by their names; one without a name is called by its text."""
+    found: dict[str, str] = {}
+    for text in given:
+        name, named, formula = text.partition("=")
+        plain = not named or not NAME.fullmatch(name.strip())
+        found[text.strip() if plain else name.strip()] = text if plain else formula
+    return found
 
 
 def _document(record: str, score: Score) -> dict[str, Any]:

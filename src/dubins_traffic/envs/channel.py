@@ -8,17 +8,16 @@ of an instance, are judged on its frames.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.cars.state import Frames, Observation
 from dubins_traffic.learning.flat import FlatObserver
 from dubins_traffic.observations.senses import Senses
-from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.scoring.formulas import FormulaVerdicts, Status
 from dubins_traffic.shield.filter import ShieldFilter
 from dubins_traffic.trial.disturbance import CommandLine
+from dubins_traffic.verification.worlds import with_formulas
 
 if TYPE_CHECKING:
     import numpy as np
@@ -157,13 +156,3 @@ class FormulaWatch:
         self._verdicts.frames(frame)
         self._tick, self._contacts = self._trial.tick, self._contacts + len(frame.contacts)
         self.states = {one.name: one.verdict for one in self._verdicts.result()}
-
-
-def with_formulas(instance: Instance, formulas: Mapping[str, str]) -> Instance:
-    """Return an instance whose problem carries formulas.
-
-    FormulaError if one can't be read or monitored, or names what the problem lacks.
-    """
-    problem = replace(instance.problem, formulas=dict(formulas))
-    check_formulas(problem, instance.names)
-    return replace(instance, problem=problem)

@@ -12,7 +12,6 @@ from gymnasium import spaces
 
 from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.engine.egos import can_share, undisturbed
-from dubins_traffic.envs.channel import with_formulas
 from dubins_traffic.envs.episodes import Episodes, Levels
 from dubins_traffic.envs.terms import weights_of
 from dubins_traffic.errors import InputError
@@ -20,6 +19,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.learning.flat import SHOWN, Layout
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.verification.worlds import with_formulas
 
 if TYPE_CHECKING:
     from dubins_traffic.cars.body import Bounds

@@ -1,8 +1,10 @@
-"""The worlds of a record: who plays its cars again, where bodies overlap, and labels and contacts found from poses."""
+"""The worlds of a record: who plays its cars again, where bodies overlap, labels and contacts found from poses, and
+formulas that are asked of it afterwards.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations, product
 from math import hypot
@@ -16,6 +18,7 @@ from dubins_traffic.cars.state import EGO, Contact, Frames, Labels, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.cars.touching import Bodies, Touching
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.parts import Disturbances
 from dubins_traffic.protocols import Capabilities, Ending
@@ -251,3 +254,13 @@ class _Kept:
 
     def end(self, ending: Ending) -> None:
         """Do nothing."""
+
+
+def with_formulas(instance: Instance, formulas: Mapping[str, str]) -> Instance:
+    """Return an instance whose problem carries formulas.
+
+    FormulaError if one can't be read or monitored, or names what the problem lacks.
+    """
+    problem = replace(instance.problem, formulas=dict(formulas))
+    check_formulas(problem, instance.names)
+    return replace(instance, problem=problem)
