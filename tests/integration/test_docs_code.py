@@ -173,7 +173,8 @@ def test_the_code_of_a_page_runs(name: str, tmp_path: Path) -> None:
                         happens(reader)
                 reader.follow(block)
         reader.wait()
-        assert_made(all_pages()[name].read_text(encoding="utf-8"), folder)
+        if name.startswith("tutorials/"):
+            assert_made(all_pages()[name].read_text(encoding="utf-8"), folder)
         if name.startswith(IMPROVED):
             require_progress([table for log in reader.notes.iterdir() for table in tables(log.read_text())])
     finally:
