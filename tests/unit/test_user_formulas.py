@@ -276,6 +276,11 @@ def test_formulas_are_asked_of_a_record_that_carries_none(command: Command, tmp_
     assert json.loads(command("check", kept, "--json", *asked))["records"][0]["formulas"] == live
     text = command("check", kept, "--formula", "[] on_road_ego")
     assert re.search(r"\n  \[\] on_road_ego: (presumably true|false since)", text)
+    text = command(
+        "check", kept, "--formula", "on_road_ego => left_ego", "--formula", "b=on_road_ego -> left_ego"
+    )
+    said = dict(re.findall(r"\n  (.+): (true|false since .+|presumably .+)", text))
+    assert said["on_road_ego => left_ego"] == said["b"] == "false since 0.000 s"
 
 
 @pytest.mark.parametrize("wrong", ["[] lefd_ego", "mine=[] (", "a <= b"])
@@ -286,6 +291,15 @@ def test_a_formula_that_can_not_be_asked_is_refused(
     assert main(["check", str(tmp_path / "out" / "trial-0000.mcap"), "--formula", wrong]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert f"formulas.{wrong.partition('=')[0] if 'mine' in wrong else wrong}: line 1, column" in line
+
+
+def test_two_formulas_of_one_name_are_refused(
+    command: Command, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command("run", written(tmp_path, {}), "--records", str(tmp_path / "out"))
+    words = ["--formula", "a=true", "--formula", "a = false"]
+    assert main(["check", str(tmp_path / "out" / "trial-0000.mcap"), *words]) == 2
+    assert "--formula: two formulas of one name: got 'a'" in capsys.readouterr().err
 
 
 def test_a_problem_without_rules_is_checked_by_its_formulas(command: Command, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from dubins_traffic.cli import faults, options
-from dubins_traffic.errors import shown
+from dubins_traffic.errors import InputError, shown
 from dubins_traffic.rules.clauses import explain
 
 if TYPE_CHECKING:
@@ -27,8 +27,8 @@ EXAMPLES = options.examples(
     "check out/trial-0000.mcap --json",
     "check out/*.mcap --formula 'on the road=[] on_road_ego'",
 )
-NAME = re.compile(r"[A-Za-z][\w -]{0,99}")
-"""Name of a formula: what stands before a `=` that is none of the formula's own."""
+NAMED = re.compile(r"([A-Za-z][\w -]{0,99})=(?!>)(.+)", re.DOTALL)
+"""A formula with a name before it: a `=` that is none of the formula's own, as in `=>`."""
 FormulaOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -70,12 +70,14 @@ def check(
 
 
 def _formulas(given: list[str]) -> dict[str, str]:
-    """Return formulas by their names; one without a name is called by its text."""
+    """Return formulas by their names; one without a name is called by its text. InputError if two have one name."""
     found: dict[str, str] = {}
     for text in given:
-        name, named, formula = text.partition("=")
-        plain = not named or not NAME.fullmatch(name.strip())
-        found[text.strip() if plain else name.strip()] = text if plain else formula
+        named = NAMED.fullmatch(text.strip())
+        name, formula = (text.strip(), text) if named is None else (named[1].strip(), named[2])
+        if name in found:
+            raise InputError("two formulas of one name", field="--formula", value=name)
+        found[name] = formula
     return found
 
 
