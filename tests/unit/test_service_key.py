@@ -120,6 +120,19 @@ def test_another_key_opens_nothing_and_is_told_at_the_start(tmp_path: Path) -> N
     keyless.close()
 
 
+@pytest.mark.usefixtures("service")
+def test_no_key_is_taken_for_the_folder_s_where_nobody_can_tell(tmp_path: Path) -> None:
+    """As in a backup without it: a wrong key was kept for good, and the right one refused."""
+    key, check = tmp_path / "here.key", tmp_path / "here" / "key.check"
+    kept = key.read_text()
+    check.unlink()
+    key.write_text("f" * 64)
+    opened(tmp_path).close()
+    assert not check.exists()
+    key.write_text(kept)
+    opened(tmp_path).close()
+
+
 def test_a_worker_is_given_the_seed_of_one_trial_of_its_lease(service: Service) -> None:
     with service.database.writing() as session:
         submission = handed(session, service, "test")

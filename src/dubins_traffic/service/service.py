@@ -234,21 +234,28 @@ def _moment(at: float | None) -> datetime | None:
 
 def _key(path: Path, folder: Path) -> bytes | None:
     if not path.exists():
-        if any((folder / "competitions").glob("*/")):  # a new key would read nothing of what they hold
+        if _has_competitions(folder):  # a new key would read nothing of what they hold
             return None
         path.parent.mkdir(parents=True, exist_ok=True, mode=0o700)
         sealing.make_key_file(path, folder)
     return _read(path, folder)
 
 
+def _has_competitions(folder: Path) -> bool:
+    return any((folder / "competitions").glob("*/"))
+
+
 def _read(path: Path, folder: Path) -> bytes:
     """Return the key in a file; NoKeyError if a service of this folder has had another one before.
 
-    What the first key has encrypted stays in the folder, and tells the others.
+    What the first key has encrypted stays in the folder, and tells the others. It is kept before there are
+    competitions: later nobody could tell whether a key is that with which they were sealed.
     """
     key, check = sealing.read_key(path, folder), folder / CHECK
     hiding = hiding_of(key, CHECK)
     if not check.exists():
+        if _has_competitions(folder):
+            return key
         replace_file(check, lambda neighbour: neighbour.write_bytes(hiding.hide(b"", CHECK)), durable=True)
     try:
         hiding.show(check.read_bytes(), CHECK)
