@@ -1,7 +1,7 @@
 """`python -m benchmarks.season [SUBMISSIONS TEAMS TRIALS WORKERS]`: a whole season, on PostgreSQL and a store of S3.
 
-Teams hand in as many submissions as are wanted, workers beside the server judge them, and meanwhile two readers ask for
-tables and for the page of health, one of each in turn. What a worker costs the server, in processor time for each
+Teams hand in as many submissions as are wanted, workers beside the server judge them, and meanwhile a reader asks for
+tables and for the page of health in turn. What a worker costs the server, in processor time for each
 second of work, says for how many workers it is enough.
 """
 
@@ -19,7 +19,7 @@ from unittest import mock
 import httpx
 import numpy as np
 from tests import postgres, s3
-from tests.services import STANDING, Person, Service, competition_text, serving, wait_until
+from tests.services import STANDING, Person, Service, season, wait_until
 
 from benchmarks.table import Row, show
 
@@ -31,7 +31,7 @@ MANY = 100
 """Workers of which the server's part is told."""
 
 
-class Readers(threading.Thread):
+class Reader(threading.Thread):
     """Asks for a table and for the page of health in turn, until told to stop; keeps how long each took."""
 
     def __init__(self, url: str) -> None:
@@ -71,13 +71,13 @@ def handed_in(people: list[Person], submissions: int) -> None:
         people[number % len(people)].submit("short/practice", f"{STANDING}\n# {number}\n")
 
 
-def judged(service: Service, submissions: int, teams: int, trials: int) -> tuple[Readers, float, float]:
-    """Return what readers waited while a season was judged, its seconds, and the server's processor time in it."""
+def judged(service: Service, submissions: int, teams: int, trials: int) -> tuple[Reader, float, float]:
+    """Return what a reader waited while a season was judged, its seconds, and the server's processor time in it."""
     organiser = service.organiser()
     people = [service.person().join(organiser.invite(), f"p{k}", f"t{k}").with_token() for k in range(teams)]
     before, began = processor_s(service.process.pid), time.perf_counter()
-    readers = Readers(service.url)
-    readers.start()
+    reader = Reader(service.url)
+    reader.start()
     handed_in(people, submissions)
 
     def ended() -> bool:
@@ -90,8 +90,8 @@ def judged(service: Service, submissions: int, teams: int, trials: int) -> tuple
 
     wait_until(ended, seconds=6.0 * submissions * trials, pause=5.0)
     took = time.perf_counter() - began
-    readers.stop()
-    return readers, took, processor_s(service.process.pid) - before
+    reader.stop()
+    return reader, took, processor_s(service.process.pid) - before
 
 
 def measure(
@@ -104,15 +104,12 @@ def measure(
         s3.store(Path(name) / "s3") as store,
         mock.patch.dict(os.environ, store.environment()),
     ):
-        folder = Path(name)
-        (folder / "short.toml").write_text(competition_text(trials))
         settings = (
             f'database = "{cluster.url("season")}"\nstorage = "s3://{s3.BUCKET}/here"\nlogins = 100000\n'
         )
-        arguments = ("--competition", str(folder / "short.toml"), "--workers", str(workers))
-        with serving(folder / "here", *arguments, "--trust-submissions", settings=settings) as service:
-            readers, took, used = judged(service, submissions, teams, trials)
-    table, health = readers.late(TABLE), readers.late(HEALTH)
+        with season(Path(name), "--workers", str(workers), settings=settings, trials=trials) as service:
+            reader, took, used = judged(service, submissions, teams, trials)
+    table, health = reader.late(TABLE), reader.late(HEALTH)
     share = used / took / workers
     what = f"{submissions:,} submissions of {trials} trials by {teams} teams, {workers} workers"
     return [

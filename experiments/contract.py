@@ -47,9 +47,7 @@ def world(grid: tuple[int, int], length: float, agents: list[dict[str, Any]], **
 
 
 FREE: Final = [{"type": "free", "name": "free", "count": 2}]
-SOON: Final = {
-    "rest_time": 40.0, "journey_start_time": 8.0, "goal_time": 20.0, "gap_rounds": 17.5
-}  # fmt: skip
+SOON: Final = {"rest_time": 40.0, "journey_start_time": 8.0, "goal_time": 20.0, "gap_rounds": 17.5}
 """Limits by which all that others may do to make the ego wait is over after 350 s: so 440 s show it.
 
 A shorter time for a journey would leave a free car none in which it does as it likes (`agents.free.RESERVE`)."""

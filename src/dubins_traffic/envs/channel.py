@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import Frames, Observation
 from dubins_traffic.learning.flat import FlatObserver
@@ -30,21 +30,14 @@ if TYPE_CHECKING:
 
 
 class TrialView:
-    """Shows one trial of a group as if it ran by itself."""
+    """Shows one trial of a group as if it ran by itself.
+
+    It keeps no view of the group's arrays: in a copy that would show arrays of its own.
+    """
 
     def __init__(self, group: Group, row: int) -> None:
         self._group, self._row = group, row
         self.instance: Instance = group.instances[row]
-        self._state, self._labels = group.of_trial(row)
-
-    def __getstate__(self) -> dict[str, Any]:
-        """Return what is copied: not what shows a part of the group's arrays, which a copy has of its own group."""
-        return {name: own for name, own in self.__dict__.items() if name not in ("_state", "_labels")}
-
-    def __setstate__(self, state: dict[str, Any]) -> None:
-        """Be a copy."""
-        self.__dict__.update(state)
-        self._state, self._labels = self._group.of_trial(self._row)
 
     @cached_property
     def _senses(self) -> Senses:
@@ -57,14 +50,15 @@ class TrialView:
 
     def observe(self) -> Observation:
         """Return what a controller would be told in the present frame."""
-        return self._senses.observe(self.tick, self._state, self._labels)
+        return self._senses.observe(self.tick, *self._group.of_trial(self._row))
 
     def frame(self, known: int) -> Frames:
         """Return the present frame, with the contacts of the trial so far but for the first `known` ones."""
         b, cars, rate = self._row, len(self.instance.starts), self.instance.problem.rate
         asked = [self._group.commands[b : b + 1, :cars, k] for k in (0, 1)]
         contacts = tuple(self._group.contacts[b][known:])
-        return Frames(self.tick, rate, *self._state[:6], *asked, *self._labels, contacts=contacts)
+        state, labels = self._group.of_trial(b)
+        return Frames(self.tick, rate, *state[:6], *asked, *labels, contacts=contacts)
 
 
 class EgoChannel:

@@ -11,6 +11,7 @@ import time
 import tomllib
 from collections.abc import Callable
 from datetime import UTC, datetime
+from functools import lru_cache
 from pathlib import Path
 from typing import Annotated
 
@@ -252,15 +253,22 @@ def _read(path: Path, folder: Path) -> bytes:
     competitions: later nobody could tell whether a key is that with which they were sealed.
     """
     key, check = sealing.read_key(path, folder), folder / CHECK
-    hiding = hiding_of(key, CHECK)
-    if not check.exists():
-        if _has_competitions(folder):
-            return key
-        replace_file(check, lambda neighbour: neighbour.write_bytes(hiding.hide(b"", CHECK)), durable=True)
-    try:
-        hiding.show(check.read_bytes(), CHECK)
-    except HiddenError:
-        raise NoKeyError(
-            "not the key of this folder", file=str(path), expected=f"the key that wrote {check}"
-        ) from None
+    if check.exists():
+        if not _fits(key, check.read_bytes()):
+            raise NoKeyError(
+                "not the key of this folder", file=str(path), expected=f"the key that wrote {check}"
+            )
+    elif not _has_competitions(folder):
+        hidden = hiding_of(key, CHECK).hide(b"", CHECK)
+        replace_file(check, lambda neighbour: neighbour.write_bytes(hidden), durable=True)
     return key
+
+
+@lru_cache(maxsize=4)
+def _fits(key: bytes, check: bytes) -> bool:
+    """Tell whether a key has written a check; it is remembered, since scrypt takes a while and pages ask again."""
+    try:
+        hiding_of(key, CHECK).show(check, CHECK)
+    except HiddenError:
+        return False
+    return True

@@ -296,7 +296,8 @@ class Link:
             if self._streams(still) and now >= self._next_view:
                 self._show(onward(self._state, self._elapsed(now)), self._elapsed(now), now)
             if now >= sent_again or (again < math.inf and inbox.returned > self._returned):
-                again = max(again, min(2.0 * again, AGAIN))
+                if self.transport.tagged:
+                    again = max(again, min(2.0 * again, AGAIN))
                 sent_again = now + again
                 self._returned, self._repeated = inbox.returned, True
                 self._send_again()

@@ -143,12 +143,12 @@ function setSpeed(speed) {
 
 function fit() {
   state.fitted = true;
-  const [stage, toggles, buttons] = ["stage", "toggles", "zoom"].map((id) => find(id).getBoundingClientRect());
+  const [stage, buttons] = ["stage", "zoom"].map((id) => find(id).getBoundingClientRect());
   const inRow = buttons.width > buttons.height;
   map.fit({
     above: inRow ? buttons.bottom - stage.top : 0,
     right: inRow ? 0 : stage.right - buttons.left,
-    below: stage.bottom - toggles.top,
+    below: map.covered.high,
   });
   draw();
 }
