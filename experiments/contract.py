@@ -1,32 +1,32 @@
 """Both sides of the contract, searched for a million trials each: who keeps E1 to E6 and blocks, who is provoked?
 
     python -m experiments contract
-    python -m experiments.contract [--trials N] [--seconds S] [--searches NAME,...] [--workers W] [--store]
+    python -m experiments.contract [--trials N] [--seconds S] [--searches NAME,...] [--seed K] [--workers W] [--store]
 
 `rules` and `lanes+shield` drive among `free` e-agents, which search through what E1 to E6 allow: in how many trials do
 they wait for a visit longer than the limit, though nobody has broken a rule? And an ego that is any program under the
 shield (`experiments.free_egos`) drives among `lawful` cars: in how many trials is one of these the first to break a
 rule? Each search ends after N trials, a million unless said otherwise, or S seconds, a day. Its folder below
 `build/contract` is of the package's sources; Ctrl-C keeps what is done, and the next call goes on. With --store the
-counts so far are kept as the result of the experiment, whatever the number of trials.
+counts so far are kept as the result of the experiment, whatever the number of trials; another seed, on another machine
+or day, adds to those of the same sources.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.table import Row, show
 
-from dubins_traffic.falsification.archive import Found
 from dubins_traffic.falsification.contract import BLOCKED, PROVOKED
 from dubins_traffic.falsification.search import falsify
 from dubins_traffic.problem.configuration import Configuration
-from experiments.stored import code, store, write_page
+from experiments.stored import code, load, store, write_page
 
 ROOT: Final = Path(__file__).resolve().parents[1]
 FOLDER: Final = ROOT / "build" / "contract"
@@ -92,43 +92,70 @@ HAPPENS: Final = {
 }
 
 
-def searched(name: str, trials: int = TRIALS, seconds: float = DAY, workers: int = 1) -> Found:
-    """Search, or go on where an earlier search of the same sources ended, and return what has been found."""
-    own, folder = SEARCHES[name], FOLDER / code(*RESTS_ON) / name
+@dataclass(frozen=True, slots=True)
+class Count:
+    """What a search of one seed has come to, with the sources of `code`."""
+
+    search: str
+    code: str
+    seed: int
+    trials: int
+    found: int
+    discarded: int
+    kinds: tuple[str, ...]
+
+
+def searched(name: str, trials: int, seconds: float, seed: int, workers: int) -> Count:
+    """Search, or go on where an earlier search of the same sources and seed ended, and count what has been found."""
+    own, sources = SEARCHES[name], code(*RESTS_ON)
+    folder = FOLDER / sources / f"{name}-{seed}"
     began = time.monotonic()
     found = falsify(
         Configuration.from_document(own.world), own.controller, folder, rules=[own.target], trials=trials,
-        seconds=seconds, seed=SEED, duration=None, workers=workers, resume=folder.exists(),
+        seconds=seconds, seed=seed, duration=None, workers=workers, resume=folder.exists(),
     )  # fmt: skip
     took = time.monotonic() - began
     print(f"{name}: {found.trials:,} trials, {found.violated} found, {took:.0f} s", flush=True)
     for case in found.cases.values():
         print(f"  {case.story.sentence}", flush=True)
-    return found
+    return Count(
+        name, sources, seed, found.trials, found.violated, found.discarded, tuple(sorted(found.cases))
+    )
 
 
-def row(name: str, found: Found) -> Row:
-    """Return the row of a search."""
-    own = SEARCHES[name]
-    kinds = ", ".join(sorted(found.cases))
-    told = f"{found.violated:,}" + (f" ({kinds})" if kinds else "")
-    more = f"; {found.discarded:,} in which somebody broke a rule before the ego did"
+def together(counts: Iterable[Count]) -> list[Count]:
+    """Return counts with those of other seeds that are stored of the same sources, in the order of the searches."""
+    before = load("contract")
+    stored = [
+        Count(**{**count, "kinds": tuple(count["kinds"])}) for count in (before.counts if before else ())
+    ]
+    sources = code(*RESTS_ON)
+    latest = {(count.search, count.seed): count for count in (*stored, *counts) if count.code == sources}
+    return [latest[key] for key in sorted(latest, key=lambda key: (list(SEARCHES).index(key[0]), key[1]))]
+
+
+def rows(counts: Iterable[Count]) -> list[Row]:
+    """Return a row for each search of which there are counts."""
+    every = list(counts)
+    by_search = {name: [count for count in every if count.search == name] for name in SEARCHES}
+    return [_row(SEARCHES[name], found) for name, found in by_search.items() if found]
+
+
+def _row(own: Wanted, counts: list[Count]) -> Row:
+    trials, found, discarded = (
+        sum(getattr(count, name) for count in counts) for name in ("trials", "found", "discarded")
+    )
+    kinds = ", ".join(sorted({kind for count in counts for kind in count.kinds}))
+    told = f"{found:,}" + (f" ({kinds})" if kinds else "")
+    more = f"; {discarded:,} in which somebody broke a rule before the ego did"
     bar = f"0 of {TRIALS:,}" if own.bar else ""
-    met = not own.bar or (not found.violated and found.trials >= TRIALS)
-    return Row(f"{own.says}, {found.trials:,} searched: {HAPPENS[own.target]}", told + more, bar, met)
-
-
-def rows(
-    names: tuple[str, ...] = tuple(SEARCHES), trials: int = TRIALS, seconds: float = DAY, workers: int = 1
-) -> Iterator[Row]:
-    """Yield the rows of searches."""
-    for name in names:
-        yield row(name, searched(name, trials, seconds, workers))
+    met = not own.bar or (not found and trials >= TRIALS)
+    return Row(f"{own.says}, {trials:,} searched: {HAPPENS[own.target]}", told + more, bar, met)
 
 
 def measure() -> list[Row]:
     """Return the rows of this experiment."""
-    return list(rows())
+    return rows(searched(name, TRIALS, DAY, SEED, 1) for name in SEARCHES)
 
 
 def main() -> int:
@@ -137,14 +164,19 @@ def main() -> int:
     parser.add_argument("--trials", type=int, default=TRIALS)
     parser.add_argument("--seconds", type=float, default=DAY)
     parser.add_argument("--searches", default=",".join(SEARCHES), metavar="NAME,...")
+    parser.add_argument("--seed", type=int, default=SEED)
     parser.add_argument("--workers", type=int, default=1)
     parser.add_argument("--store", action="store_true")
     asked = parser.parse_args()
-    found = list(rows(tuple(asked.searches.split(",")), asked.trials, asked.seconds, asked.workers))
+    counts = [
+        searched(name, asked.trials, asked.seconds, asked.seed, asked.workers)
+        for name in asked.searches.split(",")
+    ]
     if asked.store:
-        store("contract", found)
+        counts = together(counts)
+        store("contract", rows(counts), [asdict(count) for count in counts])
         write_page()
-    return 0 if show("contract", found) else 1
+    return 0 if show("contract", rows(counts)) else 1
 
 
 if __name__ == "__main__":

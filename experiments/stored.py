@@ -157,6 +157,7 @@ class Stored:
     """A result: the command that gave it, when, of which commit, on what, and its rows.
 
     `stated` names the page that a result was taken from which had been run before results were stored, else it is "".
+    `counts` is what its rows sum up, for an experiment that further runs add to.
     """
 
     command: str
@@ -165,6 +166,7 @@ class Stored:
     machine: str
     rows: tuple[Row, ...]
     stated: str = ""
+    counts: tuple[dict[str, Any], ...] = ()
 
 
 def load(name: str) -> Stored | None:
@@ -176,14 +178,15 @@ def load(name: str) -> Stored | None:
     return Stored(**{**found, "rows": tuple(Row(**row) for row in found["rows"])})
 
 
-def store(name: str, rows: Sequence[Row]) -> None:
-    """Keep the rows of an experiment that has just been run on this tree."""
+def store(name: str, rows: Sequence[Row], counts: Sequence[dict[str, Any]] = ()) -> None:
+    """Keep the rows of an experiment that has just been run on this tree, and what they sum up."""
     made = Stored(
         f"python -m experiments {name}",
         datetime.now(UTC).strftime("%Y-%m-%d"),
         _commit(),
         machine(),
         tuple(rows),
+        counts=tuple(counts),
     )
     FOLDER.mkdir(exist_ok=True)
     write_text(FOLDER / f"{name}.json", json.dumps(asdict(made), indent=1, ensure_ascii=False) + "\n")
