@@ -23,6 +23,7 @@ from dubins_traffic.problem.overlap import body_shape, overlap
 from dubins_traffic.problem.starts import TIGHT, Ground, Wish, check_given
 from dubins_traffic.roads.generate import most_segments
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.rules.judged import distinct_problems
 from tests.roadnets import networks
 
 quick = settings(max_examples=40, deadline=None, derandomize=True)
@@ -347,6 +348,14 @@ def test_many_instances_drawn_at_once_are_those_drawn_one_by_one(changes: dict[s
     for instance in many:
         alone = draw(load_config(document), 2**63 + 1, instance.trial)
         assert instance_to_document(instance) == instance_to_document(alone)
+
+
+def test_instances_of_a_configuration_are_alike_but_for_roads() -> None:
+    rules = {"network": {"random": {"intersections": 5, "segments": 6}}, "rules": True}
+    config = load_config({"version": 1, "problem_domain": "dubins_traffic", "number_trials": 1, **rules})
+    kinds, index = distinct_problems([instance.problem for instance in draw_many(config, 1, range(8))])
+    assert len(kinds) == 1
+    assert index.tolist() == [0] * 8
 
 
 @pytest.mark.parametrize("body", [Disc(0.1), Rectangle(0.3, 0.1)])

@@ -12,6 +12,7 @@ from enum import IntEnum
 from itertools import islice
 
 from dubins_traffic.cars.body import Car, Obstacle
+from dubins_traffic.cars.read_only import read_only
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
@@ -129,7 +130,8 @@ class Recipe:
         self._settings = settings
         self._car = configuration.car
         self._radius = settings.radius
-        self._rules = settings.rule_parameters
+        # One mapping for all trials: what follows from it is computed once for a batch (`distinct_problems`).
+        self._rules = read_only(settings.rule_parameters)
         self._obstacles = settings.obstacle_values
         self._laser = settings.laser
         self._disturbances = settings.disturbances

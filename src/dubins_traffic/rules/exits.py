@@ -174,9 +174,9 @@ def taken_exits(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables
 def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeTables) -> tuple[bool, int]:
     """Return whether car n of trial b, in the disc of v, has a free exit (E4), and the tick in which to ask again.
 
-    The lane on segment `back` is no exit. A car near the disc with its centre outside it is in the way of one exit at
-    most. So while fewer cars are near than there are lanes, and none has its centre in the disc, an exit is free until
-    another car can have come near or into the disc.
+    The lane on segment `back` is no exit. While no other car is near the disc, nothing is in the way of an exit. A car
+    near it with its centre outside is in the way of one exit at most: so while fewer cars are near than there are
+    lanes, and none has its centre in the disc, an exit is free until another car can have come near or into the disc.
     """
     state, t, spacing, own, terms = (
         tables.state, tables.roads, tables.spacing, tables.rules[b], tables.terms[b],
@@ -184,8 +184,7 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
     row = int(t.vert_off[own.net]) + v
     vx, vy = t.vertex[row].x, t.vertex[row].y
     far2, lone = terms.exit2, terms.lone
-    near = 0 if back < 0 else 1
-    near += 0 if lane_taken(b, n, v, tables) < 0 else 4
+    near = inside = 0
     nearest2 = beyond2 = lone * lone
     count = list_near(state, b, tick, vx, vy, lone, spacing)
     for i in range(count):
@@ -196,12 +195,17 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
         dy = state.y[b, k] - vy
         d2 = dx * dx + dy * dy
         near += 1 if d2 <= far2 else 0
-        near += 4 if tables.labels.at[b, k] == v else 0
+        inside += 1 if tables.labels.at[b, k] == v else 0
         nearest2 = min(nearest2, d2)
         beyond2 = min(beyond2, d2 if d2 > far2 else beyond2)
-    if near < t.degree[row] and tables.obstacles.base[b] < 0:
-        spare = min(sqrt(nearest2) - own.radius, sqrt(beyond2) - sqrt(far2)) - GRAIN
-        return True, tick + ticks_within(spare, spacing, b)
+    if tables.obstacles.base[b] < 0:
+        spare = sqrt(beyond2) - sqrt(far2) - GRAIN
+        if near == 0:
+            return True, tick + ticks_within(spare, spacing, b)
+        lanes = t.degree[row] - (0 if back < 0 else 1)
+        if near < lanes and inside == 0 and lane_taken(b, n, v, tables) < 0:
+            spare = min(spare, sqrt(nearest2) - own.radius - GRAIN)
+            return True, tick + ticks_within(spare, spacing, b)
     return find_exit(b, n, v, back, count, tables), tick + 1
 
 
