@@ -351,7 +351,7 @@ def test_many_instances_drawn_at_once_are_those_drawn_one_by_one(changes: dict[s
 
 
 def test_instances_of_a_configuration_are_alike_but_for_roads() -> None:
-    rules = {"network": {"random": {"intersections": 5, "segments": 6}}, "rules": True}
+    rules = {"network": {"random": {"intersections": 5, "segments": 5}}, "rules": True}
     config = load_config({"version": 1, "problem_domain": "dubins_traffic", "number_trials": 1, **rules})
     kinds, index = distinct_problems([instance.problem for instance in draw_many(config, 1, range(8))])
     assert len(kinds) == 1
