@@ -12,7 +12,7 @@ import signal
 import socket
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import httpx
@@ -135,21 +135,49 @@ def test_told_to_end_it_gives_back_what_is_on_lease(tmp_path: Path) -> None:
     database.close()
 
 
-def test_slow_connections_cost_no_lease(tmp_path: Path) -> None:
-    """Sixty of them send a byte of a head again and again, while leases of two seconds are held."""
+def heads(there: socket.socket, ended: threading.Event) -> None:
+    """Send a head without end."""
+    there.sendall(b"POST /api/lease HTTP/1.1\r\nx: ")
+    drip(there, ended)
+
+
+def bodies(there: socket.socket, ended: threading.Event) -> None:
+    """Send a body without end."""
+    there.sendall(b"POST /login HTTP/1.1\r\nhost: here\r\ncontent-length: 60000\r\n\r\nname=")
+    drip(there, ended)
+
+
+def readers(there: socket.socket, ended: threading.Event) -> None:
+    """Ask for the largest file again and again, and read nothing of it."""
+    there.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    there.setblocking(False)
+    asks = b"GET /static/site.css HTTP/1.1\r\nhost: here\r\n\r\n"
+    while not ended.wait(0.2):
+        with contextlib.suppress(BlockingIOError):
+            there.send(asks)
+
+
+def drip(there: socket.socket, ended: threading.Event) -> None:
+    while not ended.wait(0.2):
+        there.sendall(b"a")
+
+
+@pytest.mark.parametrize("dawdle", [heads, bodies, readers])
+def test_slow_connections_cost_no_lease(
+    tmp_path: Path, dawdle: Callable[[socket.socket, threading.Event], None]
+) -> None:
+    """Sixty of them send a byte again and again, or read nothing, while leases of two seconds are held."""
     with season(tmp_path, "--workers", "1", settings=SETTINGS, trials=TRIALS) as service:
         person = service.person().join(service.organiser().invite(), "Ann", "Ants").with_token()
         host, _, port = service.url.removeprefix("http://").partition(":")
         ended = threading.Event()
 
-        def dawdle() -> None:
+        def again() -> None:
             while not ended.is_set():
                 with contextlib.suppress(OSError), socket.create_connection((host, int(port))) as there:
-                    there.sendall(b"POST /api/lease HTTP/1.1\r\nx: ")
-                    while not ended.wait(0.2):
-                        there.sendall(b"a")
+                    dawdle(there, ended)
 
-        dawdling = [threading.Thread(target=dawdle) for _ in range(60)]
+        dawdling = [threading.Thread(target=again) for _ in range(60)]
         for thread in dawdling:
             thread.start()
         try:

@@ -21,7 +21,9 @@ import pytest
 import zstandard
 from sqlalchemy import select
 
+from dubins_traffic.competition.judging import judge
 from dubins_traffic.competition.sealing import make_key_file, read_key, unsealed
+from dubins_traffic.competition.submission import check_submission
 from dubins_traffic.service import viewing
 from dubins_traffic.service.database_tables import Phase, Submission, Trial
 from dubins_traffic.service.hiding import HiddenError, hiding_of
@@ -173,13 +175,15 @@ def a_season(tmp_path: Path, settings: str, also: list[Path]) -> None:
         assert all(len(own) == 2 for own in seeds.values())
         secret = {form for own in seeds.values() for seed in own for form in forms(seed)}
         secret |= {SAID.encode(), base64.b64encode(SAID.encode()), b"counted_rounds"}
-        numbers = [person.submit(f"short/{phase}", text) for phase in SECRET for text in (SAYING, CRASHING)]
         looked_at = [folder, folder.with_suffix(".log"), *also]
-        secret |= planted_in(folder)
+        known = results_at_home(folder, tmp_path / "home")
+        secret |= planted_in(folder) | known
+        numbers = [person.submit(f"short/{phase}", text) for phase in SECRET for text in (SAYING, CRASHING)]
         assert wait_until(lambda: holding(looked_at, secret) or all_ended(person, numbers)) is True
         assert holding(looked_at, secret) == []
         results = results_of(folder, numbers)
-        assert len(results) > 20
+        assert len(known) > 20
+        assert known <= results
         copied(folder, tmp_path / "copies", organiser)
         assert holding([*looked_at, tmp_path / "copies"], secret | results) == []
         assert len(kept_replays(folder)) > 4
@@ -234,12 +238,28 @@ def kept_replays(folder: Path) -> set[str]:
     return found
 
 
+def results_at_home(folder: Path, at: Path) -> set[bytes]:
+    """Return what a submission's trials in the secret phases will come to, before they are run there, in all forms."""
+    stored = StoredService(folder, folder.with_suffix(".key"))
+    at.mkdir()
+    (at / "controller.py").write_text(SAYING)
+    submission = check_submission(at / "controller.py", at / "store")
+    values: set[float] = set()
+    with stored.database.reading() as session:
+        for row in session.scalars(select(Phase).where(Phase.name.in_(SECRET))).all():
+            seeds = dict(enumerate(stored.seeds(row)))
+            for judged in judge(stored.phase(row), seeds, submission, seeds=seeds, trust=True):
+                values |= set(filter(is_telling, judged.row.values()))
+    stored.close()
+    return {form for value in values for form in float_forms(value)}
+
+
 def results_of(folder: Path, numbers: list[int]) -> set[bytes]:
     """Return the numbers in the results of submissions that tell something, in all forms."""
     stored = StoredService(folder, folder.with_suffix(".key"))
     with stored.database.reading() as session:
         submissions = [session.get_one(Submission, number) for number in numbers]
-        rows = [viewing.trial_of(stored, session, own, 0) for own in submissions]
+        rows = [viewing.trial_of(stored, session, own, number) for own in submissions for number in range(2)]
         values = [value for row in rows if row is not None for value in row.row.values()]
     stored.close()
     return {form for value in filter(is_telling, values) for form in float_forms(value)}

@@ -9,7 +9,10 @@ from contextlib import closing
 from pathlib import Path
 
 import pytest
+from sqlalchemy import text
+from sqlalchemy.exc import OperationalError
 
+from dubins_traffic.service.database import Database
 from tests import postgres
 from tests.services import COMMAND, PASSWORD, competition_text, serving
 
@@ -64,6 +67,28 @@ def test_tables_of_a_later_version_are_told_of(tmp_path: Path) -> None:
     line = refused("serve", str(tmp_path / "here"), "--key-file", str(tmp_path / "here.key"))
     assert "a later version of dubins-traffic made these tables: got '9999'" in line
     assert "install the version" in line
+
+
+def test_tables_from_before_the_first_release_are_told_of(tmp_path: Path) -> None:
+    (tmp_path / "here").mkdir()
+    path = tmp_path / "here" / "service.db"
+    database = Database(f"sqlite:///{path}")
+    database.migrate()
+    database.migrate()
+    database.close()
+    with closing(sqlite3.connect(path)) as opened, opened:
+        opened.execute("ALTER TABLE account DROP COLUMN epoch")
+    line = refused("serve", str(tmp_path / "here"), "--key-file", str(tmp_path / "here.key"))
+    assert "a version from before the first release made these tables: got 'no column epoch'" in line
+    assert "account" in line
+
+
+def test_what_a_statement_was_given_is_in_no_error(tmp_path: Path) -> None:
+    database = Database(f"sqlite:///{tmp_path / 'service.db'}")
+    with pytest.raises(OperationalError) as caught, database.writing() as session:
+        session.execute(text("INSERT INTO missing VALUES (:value)"), {"value": "swordfish"})
+    assert "swordfish" not in str(caught.value)
+    database.close()
 
 
 def later(path: Path) -> None:

@@ -18,12 +18,13 @@ from alembic import command
 from alembic.config import Config
 from alembic.runtime.migration import MigrationContext
 from alembic.script import ScriptDirectory
-from sqlalchemy import Connection, Engine, create_engine, event, text
+from sqlalchemy import Connection, Engine, create_engine, event, inspect, text
 from sqlalchemy.exc import DBAPIError, OperationalError
 from sqlalchemy.orm import Session
 from sqlalchemy.pool import ConnectionPoolEntry
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.service.database_tables import Base
 
 WRITERS_LOCK = 0x64756269
 """Number of the lock that writers hold on PostgreSQL."""
@@ -48,7 +49,10 @@ class Database:
     def __init__(self, url: str) -> None:
         sqlite = url.startswith("sqlite")
         options: dict[str, Any] = {"connect_args": {"timeout": 30}} if sqlite else {"pool_pre_ping": True}
-        self.engine: Engine = create_engine(url, pool_size=16, max_overflow=32, **options)
+        # What a statement was given may be secret, and its error goes to the log: `hide_parameters`.
+        self.engine: Engine = create_engine(
+            url, pool_size=16, max_overflow=32, hide_parameters=True, **options
+        )
         self._writes = self.engine.execution_options(writes=True)
         self._failed = threading.Event()
         if sqlite:
@@ -99,7 +103,7 @@ class Database:
     def migrate(self, revision: str = "head") -> None:
         """Bring the tables to those of this version of the package, whatever version before it made them.
 
-        InputError if a later version made them.
+        InputError if a later version made them, or one from before the first release.
         """
         config = Config()
         config.set_main_option("script_location", str(Path(__file__).with_name("migrations")))
@@ -107,6 +111,7 @@ class Database:
             config.attributes["connection"] = connection
             _check_known(connection, ScriptDirectory.from_config(config))
             command.upgrade(config, revision)
+            _check_columns(connection)
 
     def close(self) -> None:
         """Close all connections."""
@@ -124,12 +129,32 @@ def _check_known(connection: Connection, known: ScriptDirectory) -> None:
     if revision is not None and revision not in ours:
         raise InputError(
             "a later version of dubins-traffic made these tables",
-            file=connection.engine.url.render_as_string(hide_password=True),
+            file=_named(connection),
             field="version of the tables",
             value=revision,
             expected=f"{known.get_current_head()} at most: this is dubins-traffic {version('dubins-traffic')}; install "
             "the version that made them, or restore the backup from before the upgrade",
         )
+
+
+def _check_columns(connection: Connection) -> None:
+    found = inspect(connection)
+    for table in Base.metadata.sorted_tables:
+        missing = {column.name for column in table.columns} - {
+            column["name"] for column in found.get_columns(table.name)
+        }
+        if missing:
+            raise InputError(
+                "a version from before the first release made these tables",
+                file=_named(connection),
+                field=table.name,
+                value=f"no column {min(missing)}",
+                expected="a new folder or database: competitions of such a version are not taken over",
+            )
+
+
+def _named(connection: Connection) -> str:
+    return connection.engine.url.render_as_string(hide_password=True)
 
 
 def _prepare_sqlite(connection: Any, _entry: ConnectionPoolEntry) -> None:
