@@ -151,7 +151,7 @@ def readers(there: socket.socket, ended: threading.Event) -> None:
     """Ask for the largest file again and again, and read nothing of it."""
     there.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
     there.setblocking(False)
-    asks = b"GET /static/site.css HTTP/1.1\r\nhost: here\r\n\r\n"
+    asks = b"GET /static/htmx.min.js HTTP/1.1\r\nhost: here\r\n\r\n"
     while not ended.wait(0.2):
         with contextlib.suppress(BlockingIOError):
             there.send(asks)

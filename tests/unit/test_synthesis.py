@@ -22,7 +22,7 @@ from dubins_traffic.synthesis.game import build, estimate, save_game
 from dubins_traffic.synthesis.queues import WHO
 from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.solver import Solution, solve
-from dubins_traffic.synthesis.strategy import Strategy, StrategyError, check
+from dubins_traffic.synthesis.strategy import Strategy, StrategyError, check_ranks
 from tests.games import ALL, board, pan, solved
 
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
@@ -110,7 +110,7 @@ def test_a_single_goal_is_left_between_two_visits() -> None:
     """An ego that stays at its only goal does not win: the strategy has a second table, for all other places."""
     some = pan(1, (3,))
     solution = solve(build(some))
-    check(solution.game, solution.ranks)
+    check_ranks(solution.game, solution.ranks)
     away = solution.game.at_target(1)
     assert len(solution.ranks) == 2
     assert not (away & solution.game.at_target(0)).any()
@@ -154,7 +154,7 @@ def test_each_part_of_the_assumption_is_needed_but_the_last() -> None:
 @pytest.mark.parametrize(("rows", "columns", "degree"), [(2, 2, 1), (2, 2, 3), (3, 4, 1), (2, 3, 3)])
 def test_strategies_are_right_and_every_goal_recurs(rows: int, columns: int, degree: int) -> None:
     solution = solved(rows, columns, 3, ALL, degree)
-    check(solution.game, solution.ranks)
+    check_ranks(solution.game, solution.ranks)
     strategy = Strategy.of(solution)
     for environment in Environment:
         played = play(strategy, 20_000, environment, seed=7)
@@ -172,12 +172,12 @@ def test_the_check_finds_a_rank_that_is_wrong() -> None:
             ranks = first.rank.copy()
             ranks[place] = 1
             with pytest.raises(StrategyError, match="on the way to"):
-                check(solution.game, (replace(first, rank=ranks), *solution.ranks[1:]))
+                check_ranks(solution.game, (replace(first, rank=ranks), *solution.ranks[1:]))
             found += 1
     assert found > 10
     idle = replace(first, debt=np.full_like(first.debt, -1))
     with pytest.raises(StrategyError, match="nothing is owed"):
-        check(solution.game, (idle, *solution.ranks[1:]))
+        check_ranks(solution.game, (idle, *solution.ranks[1:]))
 
 
 def test_the_ego_chooses_the_lowest_rank() -> None:
@@ -205,7 +205,7 @@ def test_crowds_too_are_solved_and_the_bound_is_exact_on_the_square() -> None:
     for others, found in ((9, (4_800, 4_800, 0)), (10, (1_408, 1_408, 1_088))):
         solution = solved(2, 2, others)
         assert figures(solution) == found
-        check(solution.game, solution.ranks)
+        check_ranks(solution.game, solution.ranks)
 
 
 def test_there_may_be_many_goals() -> None:
@@ -254,7 +254,7 @@ def test_a_lean_game_has_the_same_moves_winners_and_ranks(
     for own, other in zip(thin.ranks, whole.ranks, strict=True):
         assert np.array_equal(own.rank, other.rank)
         assert own.debt.tolist() == other.debt.tolist()
-    check(thin.game, thin.ranks)
+    check_ranks(thin.game, thin.ranks)
     assert [int(loss.lost.sum()) for loss in thin.losses] == [int(loss.lost.sum()) for loss in whole.losses]
 
 

@@ -29,7 +29,7 @@ from dubins_traffic.synthesis.instance import cell_of, cells_of, start_positions
 from dubins_traffic.synthesis.road_cells import RoadCells
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Solution, solve
-from dubins_traffic.synthesis.strategy import Strategy, check
+from dubins_traffic.synthesis.strategy import Strategy, check_ranks
 from tests.games import ALL, board, pan, solved
 
 KEEP_MOVING = "E1:any-order,E2,E3,E4,E5,E6"
@@ -90,7 +90,7 @@ def test_wins_at_the_cost_of_the_environment_are_told_apart() -> None:
         assert found.everywhere
         assert int(found.vacuous.sum()) == vacuous
     found = solved_pan(3, [4])
-    check(found.game, found.ranks)
+    check_ranks(found.game, found.ranks)
     assert found.everywhere
     assert ((found.ranks[0].rank >= 0) == ~found.vacuous).all()
     assert 0 < int(found.vacuous.sum()) < found.game.positions

@@ -22,6 +22,7 @@ EXAMPLES = options.examples(
     "synth first.json --assume E1,E2,E4,E5,E6 --explain",
     "synth first.json --order-degree 1 -o first.npz --json",
     "synth first.json --spec game.structuredslugs",
+    "synth first.json --check strategy.hoa --counter-play play.json",
 )
 
 SourceArgument = Annotated[
@@ -73,6 +74,20 @@ SpecOption = Annotated[
         help="Write the game as a specification: `*.structuredslugs`, `*.tlsf`, or `*.py` for TuLiP.",
     ),
 ]
+CheckOption = Annotated[
+    str | None,
+    typer.Option(
+        "--check",
+        metavar="STRATEGY",
+        help="Play a strategy, ours or another tool's, against everything that the e-agents may do.",
+    ),
+]
+CounterPlayOption = Annotated[
+    str | None,
+    typer.Option(
+        "--counter-play", metavar="FILE", help="Write a play that it does not win, if there is one, `*.json`."
+    ),
+]
 ExplainOption = Annotated[
     bool, typer.Option("--explain", help="Say why, and what to assume if the ego does not win.")
 ]
@@ -95,6 +110,8 @@ def synth(
     strategy: StrategyOption = None,
     graph: GraphOption = None,
     spec: SpecOption = None,
+    check: CheckOption = None,
+    counter_play: CounterPlayOption = None,
     overwrite: options.Replace = False,
     explain: ExplainOption = False,
     memory: MemoryOption = None,
@@ -104,16 +121,19 @@ def synth(
 ) -> None:
     """Say whether the ego can win at all: solve the game of cells behind a problem.
 
-    Ctrl-C ends it soon; nothing is written then.
+    Exit status: 0, or 1 if a strategy that is checked does not win. Ctrl-C ends it soon; nothing is written then.
     """
     from dubins_traffic.files import write_text
     from dubins_traffic.synthesis.answer import answer
+    from dubins_traffic.synthesis.exhaustive import check_strategy
     from dubins_traffic.synthesis.game import save_game
     from dubins_traffic.synthesis.instance import start_cells
     from dubins_traffic.synthesis.specification import specification_text
-    from dubins_traffic.synthesis.strategy import Strategy, check
+    from dubins_traffic.synthesis.strategy import Strategy, check_ranks
 
-    _check_outputs(source, strategy, graph, spec, overwrite=overwrite)
+    _check_outputs(source, strategy, graph, spec, counter_play, overwrite=overwrite)
+    if counter_play is not None and check is None:
+        raise InputError("no strategy to be checked", file="--counter-play", expected="--check STRATEGY")
     instance = _instance(source, seed, trial)
     with _progress() as progress:
         found = answer(
@@ -125,21 +145,30 @@ def synth(
             progress=progress,
         )
         reasons = found.explain(progress) if explain else []
+        game = found.solution.game
+        checked = None if check is None else check_strategy(check, game, instance, progress)
     if graph is not None:
-        save_game(found.solution.game, graph, overwrite=overwrite)
+        save_game(game, graph, overwrite=overwrite)
     if spec is not None:
-        board = found.solution.game.board
-        write_text(spec, specification_text(board, start_cells(board, instance), Path(spec).suffix))
+        text = specification_text(game.board, start_cells(game.board, instance), Path(spec).suffix)
+        write_text(spec, text)
     if strategy is not None:
         won = Strategy.of(found.solution)
         won.first()
-        check(found.solution.game, won.ranks)
+        check_ranks(game, won.ranks)
         won.save(strategy, overwrite=overwrite)
+    if counter_play is not None and checked is not None and checked.counter is not None:
+        write_text(counter_play, json_text.dumps(checked.counter.to_document(game), indent=1) + "\n")
     if json:
-        extra = {"explanation": reasons} if explain else {}
+        extra: dict[str, object] = {"explanation": reasons} if explain else {}
+        if checked is not None:
+            extra["check"] = checked.to_json(game)
         print(json_text.dumps(found.to_json() | extra, indent=2))
-        return
-    print("\n".join([*found.lines(), *reasons]))
+    else:
+        told = [] if checked is None or check is None else checked.lines(check, game)
+        print("\n".join([*found.lines(), *reasons, *told]))
+    if checked is not None and not checked.wins:
+        raise typer.Exit(1)
 
 
 def _parsed(assume: str) -> Assumption:
@@ -150,7 +179,13 @@ def _parsed(assume: str) -> Assumption:
 
 
 def _check_outputs(
-    source: str, strategy: str | None, graph: str | None, spec: str | None, *, overwrite: bool
+    source: str,
+    strategy: str | None,
+    graph: str | None,
+    spec: str | None,
+    counter_play: str | None,
+    *,
+    overwrite: bool,
 ) -> None:
     """Refuse outputs that can't be written, before the game is solved."""
     from dubins_traffic.synthesis.archive import ARCHIVE, SUFFIXES
@@ -159,6 +194,7 @@ def _check_outputs(
     options.require(strategy, ARCHIVE, SUFFIXES, overwrite=overwrite, apart_from=[source])
     options.require(graph, ARCHIVE, SUFFIXES, overwrite=overwrite, apart_from=[source, strategy])
     options.require(spec, "a specification", tuple(FORMS), overwrite=overwrite, apart_from=[source])
+    options.require(counter_play, "a play", (".json",), overwrite=overwrite, apart_from=[source, spec])
 
 
 def _instance(source: str, seed: int, trial: int) -> Instance:

@@ -106,11 +106,10 @@ class Table(np.ndarray[Any, Any]):
     RECORD: Any
     KIND: Callable[[Any, int], Any]
     known: dict[Any, Any]
-    bare: npt.NDArray[Any] | None
 
     def __array_finalize__(self, source: Any) -> None:
         """Begin without rows known."""
-        self.known, self.bare = {}, None
+        self.known = {}
 
     def __getitem__(self, place: Any) -> Any:
         """Return the row, the field or the part of the table at a place."""
@@ -141,9 +140,7 @@ class Table(np.ndarray[Any, Any]):
         cast(Any, super()).__setitem__(place, value)
 
     def _find(self, place: Any) -> Any:
-        if self.bare is None:
-            self.bare = _plain(self)
-        plain = self.bare
+        plain = _plain(self)
         found = super().__getitem__(place) if plain is None else plain[place]
         if isinstance(place, str):
             found = found.view(np.ndarray)

@@ -130,8 +130,7 @@ class Recipe:
         self._settings = settings
         self._car = configuration.car
         self._radius = settings.radius
-        # One mapping for all trials: what follows from it is computed once for a batch (`distinct_problems`).
-        self._rules = read_only(settings.rule_parameters)
+        self._rules = read_only(settings.rule_parameters)  # one for all trials: see `distinct_problems`
         self._obstacles = settings.obstacle_values
         self._laser = settings.laser
         self._disturbances = settings.disturbances

@@ -198,14 +198,11 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
         inside += 1 if tables.labels.at[b, k] == v else 0
         nearest2 = min(nearest2, d2)
         beyond2 = min(beyond2, d2 if d2 > far2 else beyond2)
-    if tables.obstacles.base[b] < 0:
-        spare = sqrt(beyond2) - sqrt(far2) - GRAIN
-        if near == 0:
-            return True, tick + ticks_within(spare, spacing, b)
-        lanes = t.degree[row] - (0 if back < 0 else 1)
-        if near < lanes and inside == 0 and lane_taken(b, n, v, tables) < 0:
-            spare = min(spare, sqrt(nearest2) - own.radius - GRAIN)
-            return True, tick + ticks_within(spare, spacing, b)
+    free, spare, lanes = near == 0, sqrt(beyond2) - sqrt(far2), t.degree[row] - (0 if back < 0 else 1)
+    if not free and near < lanes and inside == 0 and lane_taken(b, n, v, tables) < 0:
+        free, spare = True, min(spare, sqrt(nearest2) - own.radius)
+    if free and tables.obstacles.base[b] < 0:
+        return True, tick + ticks_within(spare - GRAIN, spacing, b)
     return find_exit(b, n, v, back, count, tables), tick + 1
 
 

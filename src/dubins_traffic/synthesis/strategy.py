@@ -58,6 +58,21 @@ class Strategy:
             ranks_of_goal.rank[position] >= 0 for ranks_of_goal in self.ranks
         )
 
+    def check_fit(self, road_cells: RoadCells, others: int) -> None:
+        """Refuse the strategy for roads, goals or a number of e-agents other than its own (InputError)."""
+        own = self.board.road_cells
+        differences = {
+            "network": own.network.to_document() != road_cells.network.to_document(),
+            "goals": set(own.goals) != set(road_cells.goals),
+            "order_degree": own.order_degree != road_cells.order_degree,
+            "cars": self.board.others != others,
+        }
+        for name, differ in differences.items():
+            if differ:
+                raise InputError(
+                    "a strategy for another problem", field=name, expected="that of this problem"
+                )
+
     def first(self) -> int:
         """Return the first position from which the strategy wins; InputError if there is none."""
         won = np.logical_and.reduce([ranks_of_goal.rank >= 0 for ranks_of_goal in self.ranks])
@@ -106,7 +121,7 @@ class Strategy:
         ------
         InputError
             If it can't be read, is no strategy, of an unknown version, or has no rank in any position for some goal.
-            Whether it wins elsewhere is for `check`.
+            Whether it wins elsewhere is for `check_ranks`.
         """
         with Archive(path, "strategy") as archive:
             try:
@@ -267,7 +282,7 @@ class StrategyError(DubinsTrafficError):
     """A strategy does not do what it promises; the message names a position and a goal."""
 
 
-def check(game: Game, ranks: Sequence[Ranks]) -> None:
+def check_ranks(game: Game, ranks: Sequence[Ranks]) -> None:
     """Check that the ego wins by these ranks from every position that has one.
 
     StrategyError if it does not: names the first position where a condition above fails.

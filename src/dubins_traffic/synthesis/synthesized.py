@@ -12,7 +12,6 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Command, Observation
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.controllers.shield import override_text
-from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.policies.rules.exits import BACK
 from dubins_traffic.policies.rules.room import MARGIN
@@ -22,14 +21,14 @@ from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.shield.filter import ShieldFilter
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.foreign.adviser import MachineAdviser, misfit
+from dubins_traffic.synthesis.foreign.adviser import MachineAdviser
 from dubins_traffic.synthesis.foreign.machine import Machine
+from dubins_traffic.synthesis.foreign.player import check_fit
 from dubins_traffic.synthesis.foreign.read import read_machine
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import assumption_of, cells_of
 from dubins_traffic.synthesis.road_play import RoadPlay, Sight, Sighting
 from dubins_traffic.synthesis.solver import solve
-from dubins_traffic.synthesis.specification import inputs_of, outputs_of
 from dubins_traffic.synthesis.strategy import Advice, Adviser, Ranked, Strategy
 
 if TYPE_CHECKING:
@@ -251,13 +250,10 @@ def _adviser(strategy: Strategy | Machine | None, problem: Problem, *, fallback:
     if strategy is None:
         return Ranked(_solved(problem))
     if isinstance(strategy, Strategy):
-        return Ranked(_fitting(strategy, problem))
+        strategy.check_fit(cells_of(problem), len(problem.e_agents))
+        return Ranked(strategy)
     board = Board(cells_of(problem), assumption_of(problem), len(problem.e_agents))
-    unfit = misfit(board, strategy)
-    if unfit is not None:
-        name, how = unfit
-        expected = f"to read {', '.join(inputs_of(board))}; to answer {', '.join(outputs_of(board))}"
-        raise InputError(how, field=name, expected=expected)
+    check_fit(board, strategy)
     return MachineAdviser(board, strategy, fallback=fallback)
 
 
@@ -265,18 +261,3 @@ def _solved(problem: Problem) -> Strategy:
     """Return the strategy for a problem; if the game is lost it wins nowhere. InputError if the game is too large."""
     board = Board(cells_of(problem), assumption_of(problem), len(problem.e_agents))
     return Strategy.of(solve(build(board)))
-
-
-def _fitting(strategy: Strategy, problem: Problem) -> Strategy:
-    """Return `strategy`; InputError if it is for another problem."""
-    own, wanted = strategy.board.road_cells, cells_of(problem)
-    differences = {
-        "network": own.network.to_document() != wanted.network.to_document(),
-        "goals": set(own.goals) != set(wanted.goals),
-        "order_degree": own.order_degree != wanted.order_degree,
-        "cars": strategy.board.others != len(problem.e_agents),
-    }
-    for name, differ in differences.items():
-        if differ:
-            raise InputError("a strategy for another problem", field=name, expected="that of this problem")
-    return strategy

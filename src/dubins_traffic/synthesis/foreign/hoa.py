@@ -2,6 +2,8 @@
 
 Labels stand on edges; an edge holds inputs and outputs together. What is accepted does not matter: every play of a
 machine is won. `controllable-AP` says which propositions it answers; without it, nobody knows before it answers.
+In a split machine, as Spot writes it with `spot-state-player`, an edge of a state of player 0 holds the inputs, and one
+of the state of player 1 to which it leads the outputs; such a pair is joined to one edge.
 """
 
 from __future__ import annotations
@@ -45,11 +47,37 @@ def read_hoa(text: str) -> Explicit:
     body, ended, _ = rest.partition("--END--")
     if not has_body or not ended:
         raise damaged(WHAT, "--BODY-- or --END-- is missing")
-    names, start, sides = _header(_tokens(head))
+    names, start, sides, players = _header(_tokens(head))
     edges = _Body([token for token in _tokens(body) if not token.startswith(('"', "{"))], names).edges()
     if start not in edges:
         raise damaged(WHAT, "the state in which it starts is missing", value=start)
-    return Explicit(edges, start, names, sides)
+    return Explicit(_joined(edges, start, players) if players else edges, start, names, sides)
+
+
+def _joined(edges: dict[State, list[Edge]], start: int, players: list[int]) -> dict[State, list[Edge]]:
+    """Return the edges of the states of player 0, each with one of the state of player 1 to which it leads."""
+    whose: dict[State, int] = dict(enumerate(players))
+    if set(whose) != set(edges):
+        raise damaged(WHAT, "spot-state-player: not of each state", value=len(players))
+    if whose[start] != 0:
+        raise damaged(WHAT, "a machine that answers before it has read", value=start)
+    joined: dict[State, list[Edge]] = {}
+    literals = 0
+    for state in (state for state in edges if whose[state] == 0):
+        joined[state] = []
+        for edge in edges[state]:
+            if whose.get(edge.target) != 1:
+                raise damaged(WHAT, "an edge that does not lead from player 0 to player 1", value=state)
+            for answer in edges[edge.target]:
+                if whose.get(answer.target) != 0:
+                    raise damaged(
+                        WHAT, "an edge that does not lead from player 1 to player 0", value=edge.target
+                    )
+                joined[state].append(Edge({**edge.cube, **answer.cube}, answer.target))
+                literals += len(edge.cube) + len(answer.cube) + 1
+                if literals > MOST_LITERALS:
+                    raise damaged(WHAT, f"more than {MOST_LITERALS} literals on its edges")
+    return joined
 
 
 def _tokens(text: str) -> list[str]:
@@ -57,8 +85,11 @@ def _tokens(text: str) -> list[str]:
     return [token for token in _TOKEN.findall(text) if not token.startswith("/*")]
 
 
-def _header(tokens: list[str]) -> tuple[list[str], int, Sides | None]:
-    """Return the propositions, the initial state, and which propositions are read and answered."""
+def _header(tokens: list[str]) -> tuple[list[str], int, Sides | None, list[int]]:
+    """Return the propositions, the initial state, which propositions are read and answered, and the states' players.
+
+    There are no players in a machine that is not split.
+    """
     places = [place for place, token in enumerate(tokens) if token.endswith(":")]
     items = [
         (tokens[place], tokens[place + 1 : end])
@@ -79,6 +110,12 @@ def _header(tokens: list[str]) -> tuple[list[str], int, Sides | None]:
         names_of_props,
         _number(start[0], 0),
         _sides(names_of_props, [item for key, item in items if key == "controllable-AP:"]),
+        [
+            _number(item, place)
+            for key, item in items
+            if key == "spot-state-player:"
+            for place in range(len(item))
+        ],
     )
 
 
