@@ -4,6 +4,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -14,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from dubins_traffic.checkup import checkup, over_transport
+from dubins_traffic.checkup import checkup, over_transport, watch
 from dubins_traffic.checkup.checkup import Checkup, check_controller
 from dubins_traffic.checkup.passes import FIRST
 from dubins_traffic.checkup.scenarios import scenarios
@@ -137,6 +138,21 @@ def test_what_differs_from_run_to_run_is_found(faulty: str, capsys: pytest.Captu
     out = capsys.readouterr().out
     assert "FAILED deterministic" in out
     assert out.count("FAILED") == 1 + out.count("FAILED answers in time")
+
+
+def test_what_a_thread_has_waited_for_a_processor_counts_after_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for thread in ("1", "2"):
+        (tmp_path / thread).mkdir()
+        (tmp_path / thread / "schedstat").write_text("0 0 0\n")
+    monkeypatch.setattr(watch, "_tasks_of", lambda _pid: tmp_path)
+    monkeypatch.setattr(watch, "monotonic", iter((0.0, 9.0, 10.0)).__next__)
+    waited = Waited(1)
+    (tmp_path / "1" / "schedstat").write_text("0 8000000000 0\n")
+    assert waited.seconds() == 1.0
+    shutil.rmtree(tmp_path / "1")
+    assert waited.seconds() == 2.0
 
 
 def test_a_controller_that_kills_its_process_in_mid_trial(faulty: str) -> None:

@@ -76,8 +76,9 @@ class Waited:
     """
 
     def __init__(self, *pids: int) -> None:
-        self._tasks = [Path(f"/proc/{pid}/task") for pid in pids]
+        self._tasks = list(map(_tasks_of, pids))
         self._began = monotonic()
+        self._known: dict[Path, int] = {}
         self._queued = self._in_queue()
 
     def seconds(self) -> float:
@@ -86,16 +87,22 @@ class Waited:
         return elapsed - min(elapsed, max(0.0, self._in_queue() - self._queued))
 
     def _in_queue(self) -> float:
-        """Return the total time that all threads of the processes have waited for a processor, seconds."""
-        return sum(map(_queued, self._tasks)) * 1e-9
+        """Return the total time that all threads of the processes, ended ones too, have waited for a processor, s."""
+        for tasks in self._tasks:
+            self._known |= _queued(tasks)
+        return sum(self._known.values()) * 1e-9
 
 
-def _queued(tasks: Path) -> int:
-    """Return the total time that the threads of a process have waited for a processor, nanoseconds."""
-    queued = 0
+def _tasks_of(pid: int) -> Path:
+    return Path(f"/proc/{pid}/task")
+
+
+def _queued(tasks: Path) -> dict[Path, int]:
+    """Return the time that each thread of a process has waited for a processor, nanoseconds."""
+    queued: dict[Path, int] = {}
     try:
         for task in list(tasks.iterdir()):
-            queued += int((task / "schedstat").read_text(encoding="ascii").split()[1])
+            queued[task] = int((task / "schedstat").read_text(encoding="ascii").split()[1])
     except (OSError, ValueError, IndexError):
         return queued  # it ended meanwhile, or this system does not tell
     return queued
