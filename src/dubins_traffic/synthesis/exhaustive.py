@@ -81,9 +81,8 @@ class RankedPlayer:
 
     def answer(self, place: PlayPosition, memory: int) -> Answer | None:
         """Return the move to the position of lowest rank; None if none has a rank."""
-        try:
-            position = self.strategy.choose(place.position, memory)
-        except InputError:
+        position = self.strategy.best(np.array(self.game.options(place)), memory)
+        if position is None:
             return None
         after = self.game.moved(place, int(self.ego_cell[position]))
         return None if after is None else Answer(self._next(position, memory), after)

@@ -88,10 +88,16 @@ class Strategy:
         board = self.board
         out = room(board, 1, LARGEST_CHOICE)
         list_moves(board.tables, position, Work.of(board), out)
-        options = out.ego_to[: out.used[0].ego_to]
+        found = self.best(out.ego_to[: out.used[0].ego_to], goal)
+        if found is None:
+            raise InputError("the strategy does not win from there", field="position", value=position)
+        return found
+
+    def best(self, options: Numbers, goal: int) -> int | None:
+        """Return which of some positions has the lowest rank for a goal, the first of several; None if none has one."""
         ranks = self.ranks[goal].rank[options]
         if (ranks < 0).all():
-            raise InputError("the strategy does not win from there", field="position", value=position)
+            return None
         return int(options[np.argmin(np.where(ranks < 0, np.iinfo(np.int32).max, ranks))])
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:

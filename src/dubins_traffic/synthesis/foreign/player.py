@@ -59,12 +59,16 @@ class Labelled:
         """Return the cell to which an answer sends the ego; propositions that are missing count as false."""
         return sum(answer.get(name, False) << bit for bit, name in enumerate(self._bits[EGO]))
 
+    def options(self, place: PlayPosition) -> list[int]:
+        """Return the positions that the ego may make of a place, that in which it stays first."""
+        return self._moves.of_ego(place.position)
+
     def moved(self, place: PlayPosition, cell: int) -> PlayPosition | None:
         """Return the place after the ego has gone to a cell, None if it may not."""
         cell_now = place.cells[EGO]
         if cell == cell_now:
             return place
-        options = self._moves.of_ego(place.position)[1:]
+        options = self.options(place)[1:]
         road_cells, nodes = self.board.road_cells, len(self.board.road_cells.nodes)
         if cell_now < nodes:
             free = [
@@ -130,7 +134,8 @@ def check_fit(board: Board, machine: Machine) -> None:
         *((name, "that reads what the ego chooses") for name in sides.read if name in its_inputs),
         *((name, "that chooses for the others") for name in sides.answered if name not in its_inputs),
     )
-    for name, how in faults[:1]:
+    if faults:
+        name, how = faults[0]
         expected = f"to read {', '.join(inputs_of(board))}; to answer {', '.join(outputs_of(board))}"
         raise InputError(f"a strategy {how}", field=name, expected=expected)
 
