@@ -86,7 +86,7 @@ def test_who_is_slow_is_cut_off(
     connections = server.server_state.connections
     try:
         wait_until(lambda: len(connections) == ATTACKERS, pause=0.005, seconds=60)
-        assert httpx.get(server.url).text == "0"
+        assert httpx.get(server.url, timeout=60.0).text == "0"
         wait_until(lambda: not connections, seconds=60)
     finally:
         ended.set()

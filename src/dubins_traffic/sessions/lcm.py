@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from dubins_traffic.runs.single import Result
 from dubins_traffic.sessions.plan import Pace, SessionPlan
+from dubins_traffic.transports.lcm.connection import library
 from dubins_traffic.transports.lcm.transport import Lcm
 from dubins_traffic.transports.maestro import Maestro
 
@@ -31,6 +32,7 @@ def run_over_lcm(
     InputError
         If the URL is not one of LCM, or an instance can't be drawn.
     """
+    library()  # who lacks it is told before anything is compiled
     maestro = Maestro() if wait else None
     transport = Lcm(url, maestro)
     yield from session_plan.over(transport, pace, maestro, at=lambda: f"LCM at {transport.url}")

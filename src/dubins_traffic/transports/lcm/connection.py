@@ -62,12 +62,10 @@ def url_of_its_own() -> Generator[str]:
         yield f"udpm://{DEFAULT_GROUP}:{keeper.getsockname()[1]}?ttl=0"
 
 
-def connect(url: str) -> LCM:
-    """Return an LCM connection.
+def library() -> type[LCM]:
+    """Return the library's class of connections.
 
-    MissingExtraError if the library is not installed; TransportError if the library does not load for want of
-    another, or multicast packets have no way to go; the message holds the commands that help; InputError if `url` is
-    no URL of LCM.
+    MissingExtraError if it is not installed; TransportError if it does not load for want of another library.
     """
     try:
         from lcm import LCM
@@ -77,9 +75,19 @@ def connect(url: str) -> LCM:
         raise TransportError(
             "LCM is installed and does not load: its wheel needs GLib; on Debian: apt-get install libglib2.0-0"
         ) from error
+    return LCM
+
+
+def connect(url: str) -> LCM:
+    """Return an LCM connection.
+
+    As `library`; TransportError as well if multicast packets have no way to go; the message holds the commands that
+    help; InputError if `url` is no URL of LCM.
+    """
+    made = library()
     check_route(url)
     try:
-        return LCM(url)
+        return made(url)
     except RuntimeError as error:
         raise InputError("LCM can't be opened", file="--url", value=url, expected=EXPECTED) from error
 
