@@ -39,6 +39,7 @@ tools: .venv/.installed-dev
 test-all: export PYTEST_TIMEOUT := 86400
 test-all: test test-tools ## all tests, then those of which the suite runs a part, in full: hours
 	DUBINS_TRAFFIC_TRIALS_2016=50 $(BIN)/python -m pytest tests/integration/test_ros1_2016.py
+	DUBINS_TRAFFIC_TRIALS_ROS2=50 $(BIN)/python -m pytest tests/integration/test_rclpy.py
 	DUBINS_TRAFFIC_MUTANTS=full $(BIN)/python -m pytest tests/integration/test_search_of_mutants.py -k mutant_stands
 	DUBINS_TRAFFIC_SPECIFICATIONS=full $(BIN)/python -m pytest tests/crosscheck/test_game_specifications.py
 	@scripts/crosscheck-tools.sh acacia

@@ -1,6 +1,7 @@
 #!/usr/bin/env bash
 # Installs the tools with which some tests compare, each in an environment of its own in build/crosscheck:
-# Spot, stormpy (carries another Spot), rtamt, TuLiP, ltlf2dfa, omega with dd, SUMO, commonroad-io, Lanelet2; and Debian's spin and mona.
+# Spot, stormpy (carries another Spot), rtamt, TuLiP, ltlf2dfa, omega with dd, SUMO, commonroad-io, Lanelet2, rclpy of two
+# versions of ROS 2 with Fast DDS; and Debian's spin and mona.
 # With the argument `acacia` Acacia-Bonsai as well, which wants Python 3.13. What is there already is left alone.
 # Where something can't be installed it says so in one line; the status is 0 either way.
 # Two are installed at a time, by the pip of .venv: to put one into each environment takes longer than most of the tools.
@@ -43,6 +44,8 @@ mkdir -p "$folder"
 environment rtamt rtamt 'rtamt==0.4.10' setuptools
 environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
 environment omega dd.cudd,omega.games.gr1 'omega==0.4.0' 'dd==0.6.0' setuptools
+environment jazzy rclpy 'ros-rclpy~=7.1.6' 'ros-rmw-fastrtps-cpp~=8.4' 'ros-nav-msgs~=5.3'
+environment kilted rclpy 'ros-rclpy~=9.1.2' 'ros-rmw-fastrtps-cpp~=9.3' 'ros-nav-msgs~=5.5'
 environment commonroad commonroad.common.file_reader 'commonroad-io==2026.1'
 wait
 

@@ -1,46 +1,44 @@
 #!/usr/bin/env python3
 """An ego controller over ROS 2's topics, by DDS: round the goals in order, straight across country.
 
-It needs this package with the extra `ros2`, and no ROS 2: `Graph` and the messages are of the package. A node of
-ROS 2 does the same with `rclpy`. Start it beside
-``dubins-traffic ros2 run demo --lockstep``; it drives trial after trial until it is interrupted.
+It needs this package with the extra `ros2`, and no ROS 2: `Graph` and the messages are of the package; `node.py`
+does the same with `rclpy`. Start it beside ``dubins-traffic ros2 run demo --lockstep``; it drives trial after trial
+until it is interrupted.
 """
 
 import json
 import math
-import os
 import time
 
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph, usual_domain
 
 SPEED, YAW_RATE, TOLERANCE = 0.5, 0.9, 0.1
-READY, START = 4, 5
 
 
 class Controller:
-    """Answers each message of model states with one command."""
+    """Answers each message of the ego's odometry with one command."""
 
     def __init__(self):
         self.goals, self.radius, self.next, self.asked = [], 1.0, 0, 0
-        self.graph = Graph(usual_domain())
+        self.graph = Graph(usual_domain(), node="controller")
         self.commands = self.graph.writer("rt/ego/mobile_base/commands/velocity", m.Twist)
-        self.requests = self.graph.writer("rq/dubins_traffic_maestro/modeRequest", m.ModeRequest)
-        maestro = "dubins_traffic_maestro"
+        maestro = "rt/dubins_traffic_maestro"
+        self.asks = self.graph.writer(f"{maestro}/ask", m.String)
         self.readers = [
             (self.graph.reader(topic, kind, latched=latched), kind, take)
             for topic, kind, take, latched in (
-                (f"rt/{maestro}/probleminstance_JSON", m.ProblemInstanceJSON, self.begin, True),
-                (f"rr/{maestro}/modeReply", m.ModeReply, self.answered, False),
-                ("rt/gazebo/model_states", m.ModelStates, self.drive, False),
+                (f"{maestro}/probleminstance_JSON", m.String, self.begin, True),
+                (f"{maestro}/answer", m.String, self.answered, False),
+                ("rt/ego/odom", m.Odometry, self.drive, False),
             )
         ]
 
     def begin(self, message):
         """Learn the goals, or that the trial is over."""
         self.goals, self.next = [], 0
-        if message.problemjson:
-            problem = json.loads(message.problemjson)
+        if message.data:
+            problem = json.loads(message.data)
             length, (tx, ty, theta) = problem["rnd"]["length"], problem["rnd"]["transform"]
             c, s = math.cos(theta), math.sin(theta)
             self.radius = problem["intersection_radius"]
@@ -48,16 +46,16 @@ class Controller:
                 (length * (c * x - s * y) + tx, length * (s * x + c * y) + ty) for x, y in problem["goals"]
             ]
 
-    def answered(self, reply):
-        """Start the trial that is ready; a request's number is the mode it asks for."""
-        if reply.guid == os.getpid() and reply.seq == READY and reply.result:
-            self.ask(START)
+    def answered(self, message):
+        """Start the trial that is ready."""
+        if message.data == "READY granted":
+            self.ask("START")
 
     def drive(self, message):
         """Turn toward the next goal, then drive to it."""
-        if not self.goals or "ego" not in message.name:
+        if not self.goals:
             return
-        pose = message.pose[message.name.index("ego")]
+        pose = message.pose.pose
         gx, gy = self.goals[self.next % len(self.goals)]
         dx, dy = gx - pose.position.x, gy - pose.position.y
         if math.hypot(dx, dy) < self.radius / 2:
@@ -72,8 +70,8 @@ class Controller:
         self.commands.write(command)
 
     def ask(self, mode):
-        """Send a request to the maestro."""
-        self.requests.write(m.ModeRequest(os.getpid(), mode, mode))
+        """Ask the maestro for something."""
+        self.asks.write(m.String(mode))
 
     def spin(self):
         """Take messages as they come, and ask for a trial while there is none."""
@@ -84,7 +82,7 @@ class Controller:
                     take(message)
             if not self.goals and time.monotonic() > self.asked + 0.3:
                 self.asked = time.monotonic()
-                self.ask(READY)
+                self.ask("READY")
 
 
 if __name__ == "__main__":

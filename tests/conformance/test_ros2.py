@@ -30,7 +30,7 @@ class Ros2Peer(RosPeer):
         self.graph = Graph(self.transport.domain, here=False)
         self.odometry = self.graph.reader("rt/ego/odom", m.Odometry)
         topic = "rt/dubins_traffic_maestro/probleminstance_JSON"
-        self.problems = self.graph.reader(topic, m.ProblemInstanceJSON, latched=True)
+        self.problems = self.graph.reader(topic, m.String, latched=True)
         self.commands = self.graph.writer(f"rt/{self.car}/mobile_base/commands/velocity", m.Twist)
 
     def shut(self) -> None:
@@ -47,8 +47,8 @@ class Ros2Peer(RosPeer):
         for seen in self.graph.take(self.odometry, m.Odometry, 1):
             stamp, position = seen.header.stamp, seen.pose.pose.position
             return stamp.sec + 1e-9 * stamp.nanosec, position.x, position.y
-        for told in self.graph.take(self.problems, m.ProblemInstanceJSON, 1):
-            return told.problemjson
+        for told in self.graph.take(self.problems, m.String, 1):
+            return told.data
         self.graph.wait(0.05)
         return None
 

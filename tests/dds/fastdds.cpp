@@ -47,11 +47,9 @@ struct Odometry {
 };
 
 struct Instance {
-    int32_t sec = 0;
-    uint32_t nanosec = 0;
     std::string json;
-    void put(Cdr &cdr) const { cdr << sec << nanosec << json; }
-    void take(Cdr &cdr) { cdr >> sec >> nanosec >> json; }
+    void put(Cdr &cdr) const { cdr << json; }
+    void take(Cdr &cdr) { cdr >> json; }
 };
 
 template <class T>
@@ -123,8 +121,8 @@ int main(int count, char **arguments) {
         topic<Odometry>(participant, "rt/ego/odom", "nav_msgs::msg::dds_::Odometry_"), reading);
     reading.durability().kind = TRANSIENT_LOCAL_DURABILITY_QOS;
     DataReader *instances = subscriber->create_datareader(
-        topic<Instance>(participant, "rt/dubins_traffic_maestro/probleminstance_JSON",
-                        "integrator_chains_msgs::msg::dds_::ProblemInstanceJSON_"), reading);
+        topic<Instance>(participant, "rt/dubins_traffic_maestro/probleminstance_JSON", "std_msgs::msg::dds_::String_"),
+        reading);
 
     std::string problem;
     Odometry seen;

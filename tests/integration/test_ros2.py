@@ -97,7 +97,7 @@ def test_peers_are_counted_while_others_come_and_go(domain: int) -> None:
     thread = threading.Thread(target=come_and_go)
     thread.start()
     try:
-        for _ in range(100_000):
+        for _ in range(20_000):
             assert graph.heard(writer)
             assert graph.writers(reader) >= 1
     finally:
@@ -242,13 +242,13 @@ def test_faulty_clients_end_their_trials_and_the_session_goes_on(
         out, err = session.communicate(timeout=600)
     assert session.returncode == 1, err
     ends = [trial["end"] for trial in json.loads(out)["trials"]]
-    assert ends == ["peer_silent", "peer_silent", "peer_flood", "controller_fault", "reset"]
+    assert ends == ["peer_lost", "peer_silent", "peer_flood", "controller_fault", "reset"]
 
 
 def test_clients_that_go_less_than_the_silence_before_the_planned_end(
     domain: int, config: str, tmp_path: Path
 ) -> None:
-    """Four seconds are shorter than the silence that is borne, and than DDS takes to notice that one was killed."""
+    """Four seconds are shorter than the silence that is borne."""
     arguments = ("ros2", "run", config, "--trials", "3", "--records", str(tmp_path), "--json")
     with running(COMMAND, *arguments) as session:
         for number, action in enumerate(("die", "stop")):
@@ -256,13 +256,13 @@ def test_clients_that_go_less_than_the_silence_before_the_planned_end(
                 await_end(tmp_path / f"trial-{number:04d}.wall.json")
         client = Client(domain)
         client.until(START)
-        client.instance()
+        client.problem()
         client.drive()
         out, err = session.communicate(timeout=600)
         client.graph.close()
     assert session.returncode == 1, err
     ends = [trial["end"] for trial in json.loads(out)["trials"]]
-    assert ends == ["peer_silent", "peer_silent", "duration"]
+    assert ends == ["peer_lost", "peer_silent", "duration"]
     assert dt.verify(tmp_path / "trial-0000.mcap").verified
 
 
@@ -285,10 +285,10 @@ def test_time_transforms_pausing_and_placing(domain: int, config: str, tmp_path:
         client.until(START)
         client.instance()
         client.drive(20)
-        client.call("gazebo/pause_physics")
+        assert client.ask("PAUSE")
         client.watch(0.2)
         assert len(set(client.watch(0.5, times=30))) == 1
-        client.call("gazebo/unpause_physics")
+        assert client.ask("UNPAUSE")
         client.drive()
         _, err = session.communicate(timeout=600)
         times = [

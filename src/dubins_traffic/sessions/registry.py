@@ -166,8 +166,8 @@ TRANSPORTS: dict[str, TransportEntry] = {
     ),
     "ros2": TransportEntry(
         runs="dubins_traffic.sessions.ros2:run_over_ros2",
-        line="Trials over ROS 2 by DDS, with the topics of 2016 and its mode service.",
-        about="Be simulator, maestro and monitor of 2016 over DDS. Ctrl-C ends it and keeps all finished trials.",
+        line="Trials over ROS 2 by DDS, with the topics of 2016.",
+        about="Be simulator, maestro and monitor for nodes of ROS 2. Ctrl-C ends it and keeps all finished trials.",
         examples=(
             "ros2 run demo",
             "ros2 run my-trials.json --domain 7 --trials 3 --records out",

@@ -1,23 +1,24 @@
 """The messages of ROS 2 that a session sends and takes, with the type names that ROS 2 gives them in DDS.
 
-Fields are those of ROS 2's interface definitions; angles, lengths and speeds are SI. `dubins_traffic_msgs`,
-`integrator_chains_msgs` and the service `MMode` are the definitions of 2016 written as ROS 2 would.
+All are messages that come with ROS 2. Fields are those of its interface definitions; angles, lengths and speeds are SI.
 """
 
+import json
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from hashlib import sha256
+from typing import TYPE_CHECKING, Annotated, Any, get_args, get_origin, get_type_hints
 
 from cyclonedds.idl import IdlStruct
-from cyclonedds.idl.types import array, float32, int16, int32, int64, sequence, uint8, uint32, uint64
+from cyclonedds.idl.types import array, float32, int32, sequence, uint8, uint32
 
 if TYPE_CHECKING:
     Covariance = list[float]
     Ranges = list[float]
-    Texts = list[str]
+    Octets = list[int]
 else:
     Covariance = array[float, 36]
     Ranges = sequence[float32]
-    Texts = sequence[str]
+    Octets = array[uint8, 16]
 
 
 def _no_covariance() -> list[float]:
@@ -168,71 +169,102 @@ class TFMessage(IdlStruct, typename="tf2_msgs::msg::dds_::TFMessage_"):
 
 
 @dataclass
-class ModelState(IdlStruct, typename="gazebo_msgs::msg::dds_::ModelState_"):
-    """Where a car shall be."""
+class String(IdlStruct, typename="std_msgs::msg::dds_::String_"):
+    """A text."""
 
-    model_name: str = ""
-    pose: Pose = field(default_factory=Pose)
-    twist: Twist = field(default_factory=Twist)
-    reference_frame: str = ""
+    data: str = ""
 
 
 @dataclass
-class ModelStates(IdlStruct, typename="gazebo_msgs::msg::dds_::ModelStates_"):
-    """Where all cars are."""
-
-    name: Texts = field(default_factory=list[str])
-    pose: Poses = field(default_factory=list[Pose])
-    twist: Twists = field(default_factory=list[Twist])
-
-
-@dataclass
-class LabelStamped(IdlStruct, typename="dubins_traffic_msgs::msg::dds_::LabelStamped_"):
-    """Labels that hold."""
+class PoseStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PoseStamped_"):
+    """A pose, with when, and in which frame of reference."""
 
     header: Header = field(default_factory=Header)
-    label: Texts = field(default_factory=list[str])
+    pose: Pose = field(default_factory=Pose)
 
 
 @dataclass
-class ProblemInstanceJSON(IdlStruct, typename="integrator_chains_msgs::msg::dds_::ProblemInstanceJSON_"):
-    """A problem instance, version 0; empty at the end of a trial."""
+class Gid(IdlStruct, typename="rmw_dds_common::msg::dds_::Gid_"):
+    """The number of a participant, a reader or a writer."""
 
-    stamp: Time = field(default_factory=Time)
-    problemjson: str = ""
+    data: Octets = field(default_factory=lambda: [0] * 16)
 
 
-@dataclass
-class ModeRequest(IdlStruct, typename="dubins_traffic_msgs::srv::dds_::MMode_Request_"):
-    """A request to the maestro, after the client and the number of the request, by which it knows its reply."""
-
-    guid: uint64 = 0
-    seq: int64 = 0
-    mode: int16 = 0
+if TYPE_CHECKING:
+    Gids = list[Gid]
+else:
+    Gids = sequence[Gid]
 
 
 @dataclass
-class ModeReply(IdlStruct, typename="dubins_traffic_msgs::srv::dds_::MMode_Response_"):
-    """The maestro's reply to a request."""
+class NodeEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::NodeEntitiesInfo_"):
+    """A node of a participant, with its readers and writers."""
 
-    guid: uint64 = 0
-    seq: int64 = 0
-    result: bool = False
+    node_namespace: str = "/"
+    node_name: str = ""
+    reader_gid_seq: Gids = field(default_factory=list[Gid])
+    writer_gid_seq: Gids = field(default_factory=list[Gid])
 
 
-@dataclass
-class EmptyRequest(IdlStruct, typename="std_srvs::srv::dds_::Empty_Request_"):
-    """A request that says nothing; ROS 2 gives every message that is empty a byte."""
-
-    guid: uint64 = 0
-    seq: int64 = 0
-    structure_needs_at_least_one_member: uint8 = 0
+if TYPE_CHECKING:
+    Nodes = list[NodeEntitiesInfo]
+else:
+    Nodes = sequence[NodeEntitiesInfo]
 
 
 @dataclass
-class EmptyReply(IdlStruct, typename="std_srvs::srv::dds_::Empty_Response_"):
-    """The reply to it."""
+class ParticipantEntitiesInfo(IdlStruct, typename="rmw_dds_common::msg::dds_::ParticipantEntitiesInfo_"):
+    """The nodes of a participant: what `ros2 node list` shows."""
 
-    guid: uint64 = 0
-    seq: int64 = 0
-    structure_needs_at_least_one_member: uint8 = 0
+    gid: Gid = field(default_factory=Gid)
+    node_entities_info_seq: Nodes = field(default_factory=list[NodeEntitiesInfo])
+
+
+NESTED = 1
+NUMBERS = {
+    "int8": 2, "uint8": 3, "int16": 4, "uint16": 5, "int32": 6, "uint32": 7, "int64": 8, "uint64": 9, "float32": 10,
+}  # fmt: skip
+PLAIN = {float: 11, bool: 15, str: 17}
+ARRAY, UNBOUNDED = 48, 144
+"""Numbers of types, as REP 2016 has them in `type_description_interfaces/msg/FieldType`; a field's number is that of
+its elements plus one of the last two."""
+
+
+def type_hash(kind: type[IdlStruct]) -> str:
+    """Return the hash of a message's definition, by which nodes of ROS 2 tell whether they mean the same (REP 2011)."""
+    described: dict[str, Any] = {}
+    _describe(kind, described)
+    first = described.pop(_name_of(kind))
+    text = {
+        "type_description": first,
+        "referenced_type_descriptions": [described[name] for name in sorted(described)],
+    }
+    return f"RIHS01_{sha256(json.dumps(text).encode()).hexdigest()}"
+
+
+def _name_of(kind: Any) -> str:
+    package, group, _, name = kind.__idl_typename__.split("::")
+    return f"{package}/{group}/{name.removesuffix('_')}"
+
+
+def _describe(kind: Any, described: dict[str, Any]) -> None:
+    fields: list[Any] = []
+    for name, hint in get_type_hints(kind, include_extras=True).items():
+        number, capacity, inner = _field(hint)
+        if inner is not None:
+            _describe(inner, described)
+        nested = "" if inner is None else _name_of(inner)
+        told = {"type_id": number, "capacity": capacity, "string_capacity": 0, "nested_type_name": nested}
+        fields.append({"name": name, "type": told})
+    described[_name_of(kind)] = {"type_name": _name_of(kind), "fields": fields}
+
+
+def _field(hint: Any) -> tuple[int, int, Any]:
+    """Return the number of a field's type, its length if that is fixed, and the type that is nested in it."""
+    if get_origin(hint) is not Annotated:
+        return (PLAIN[hint], 0, None) if hint in PLAIN else (NESTED, 0, hint)
+    how = get_args(hint)[1]
+    if isinstance(how, str):
+        return NUMBERS[how], 0, None
+    number, _, inner = _field(how.subtype)
+    return (number + ARRAY, how.length, inner) if isinstance(how, array) else (number + UNBOUNDED, 0, inner)

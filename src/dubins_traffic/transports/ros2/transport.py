@@ -1,14 +1,13 @@
-"""The topics and the mode service of 2016, as ROS 2 would have them, as a `protocols.Transport`.
+"""The topics of 2016, as ROS 2 would have them, as a `protocols.Transport`.
 
-What the maestro of 2016 served is there as services and topics: modes, the instance, pausing, placing cars.
+What the maestro of 2016 served is there as topics: modes, the instance, pausing, placing cars. There are no services:
+implementations of DDS carry them in unlike ways, and a client of another one than ours would wait for ever.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
 from threading import Lock
 from time import monotonic, sleep
 from typing import TYPE_CHECKING, Any
@@ -20,103 +19,70 @@ from dubins_traffic.transports.maestro import Maestro, Mode, closing_if_refused
 from dubins_traffic.transports.ros import Stamps, placed
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph, usual_domain
-from dubins_traffic.transports.ros2.world import Ros2Publishers, moment
+from dubins_traffic.transports.ros2.world import Ros2Publishers
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 INSTANCE = "rt/dubins_traffic_maestro/probleminstance_JSON"
-MODE = "dubins_traffic_maestro/mode"
-PAUSE, UNPAUSE = "gazebo/pause_physics", "gazebo/unpause_physics"
-PLACE = "rt/gazebo/set_model_state"
+ASK, ANSWER = "rt/dubins_traffic_maestro/ask", "rt/dubins_traffic_maestro/answer"
+PAUSE, UNPAUSE = "PAUSE", "UNPAUSE"
 AT_ONCE = 100
 """Messages of one topic taken at a time."""
 MOST_WAITING = 1000
-"""Requests that may wait for the next instance; what is asked beyond is never answered."""
+"""What is asked may wait for the next instance, so much of it; what is asked beyond is never answered."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Service:
-    """A service of ROS 2: a topic of requests, one of replies, and who answers, with None for "not yet"."""
-
-    requests: Any
-    kind: Any
-    replies: Any
-    answer: Callable[[Any], Any]
-
-
-class MaestroServices:
-    """Answers requests, and tells the problem.
+class MaestroTopics:
+    """Answers what is asked, and tells the problem.
 
     Parameters
     ----------
     maestro : Maestro, optional
-        Who answers mode requests; without one there is no mode service.
+        Who grants modes; without one none is granted.
     """
 
     def __init__(self, graph: Graph, mailbox: Mailbox, maestro: Maestro | None) -> None:
         self._graph, self._mailbox, self._maestro = graph, mailbox, maestro
-        self._problem = graph.writer(INSTANCE, m.ProblemInstanceJSON, latched=True)
-        self._places = graph.reader(PLACE, m.ModelState)
-        self._waiting: list[tuple[_Service, Any]] = []
-        self._services = [
-            self._service(PAUSE, m.EmptyRequest, m.EmptyReply, partial(self._pause, True)),
-            self._service(UNPAUSE, m.EmptyRequest, m.EmptyReply, partial(self._pause, False)),
-        ]
-        if maestro is not None:
-            self._services.append(self._service(MODE, m.ModeRequest, m.ModeReply, self._mode))
+        self._problem = graph.writer(INSTANCE, m.String, latched=True)
+        self._asked = graph.reader(ASK, m.String)
+        self._answers = graph.writer(ANSWER, m.String)
+        self._waiting: list[str] = []
 
-    def begin(self) -> None:
-        """Take back the end of the trial before: who comes now would take it for the next one's."""
-        self._graph.lift(self._problem, m.ProblemInstanceJSON)
-
-    def announce(self, instance: Instance, stamp: m.Time) -> None:
+    def announce(self, instance: Instance) -> None:
         """Publish the problem, latched, as in 2016."""
-        self._publish(json.dumps(instance_to_document(instance, version=0)), stamp)
+        self._graph.put(self._problem, m.String(json.dumps(instance_to_document(instance, version=0))))
 
-    def end(self, stamp: m.Time) -> None:
-        """Publish that the trial is over."""
-        self._publish("", stamp)
+    def end(self) -> None:
+        """Publish that no trial runs: latched, too, since nothing may follow at once that would take its place."""
+        self._graph.put(self._problem, m.String())
 
     def serve(self) -> None:
         """Answer what has been asked."""
         asked, self._waiting = self._waiting, []
-        for service in self._services:
-            asked += [(service, one) for one in self._graph.take(service.requests, service.kind, AT_ONCE)]
-        for service, request in asked:
-            reply = service.answer(request)
-            if reply is not None:
-                self._graph.put(service.replies, reply)
+        asked += [each.data.strip() for each in self._graph.take(self._asked, m.String, AT_ONCE)]
+        for word in asked:
+            granted = self._granted(word)
+            if granted is not None:
+                self._graph.put(self._answers, m.String(f"{word} {'granted' if granted else 'refused'}"))
             elif len(self._waiting) < MOST_WAITING:
-                self._waiting.append((service, request))
-        for message in self._graph.take(self._places, m.ModelState, AT_ONCE):
-            position, turn = message.pose.position, message.pose.orientation
-            pose = placed(position.x, position.y, turn.z, turn.w)
-            if pose is not None:
-                self._mailbox.place(message.model_name, pose)
+                self._waiting.append(word)
 
-    def _service(self, name: str, request: Any, reply: Any, answer: Callable[[Any], Any]) -> _Service:
-        requests = self._graph.reader(f"rq/{name}Request", request)
-        return _Service(requests, request, self._graph.writer(f"rr/{name}Reply", reply), answer)
-
-    def _publish(self, text: str, stamp: m.Time) -> None:
-        self._graph.put(self._problem, m.ProblemInstanceJSON(stamp, text))
-
-    def _mode(self, request: m.ModeRequest) -> m.ModeReply | None:
-        assert self._maestro is not None
-        granted = self._maestro.answer(request.mode)
-        if granted is None:
-            return None
-        if granted and request.mode == Mode.START:
+    def _granted(self, word: str) -> bool | None:
+        """Do what is asked; return whether it is granted, None for "not yet"."""
+        if word in (PAUSE, UNPAUSE):
+            self._mailbox.pause(word == PAUSE)
+            return True
+        if self._maestro is None or word not in Mode.__members__:
+            return False
+        granted = self._maestro.answer(Mode[word])
+        if granted and Mode[word] is Mode.START:
             self._mailbox.pause(False)
-        return m.ModeReply(request.guid, request.seq, granted)
-
-    def _pause(self, paused: bool, request: m.EmptyRequest) -> m.EmptyReply:
-        self._mailbox.pause(paused)
-        return m.EmptyReply(request.guid, request.seq)
+        return granted
 
 
 COMMANDS = "rt/{}/mobile_base/commands/velocity"
+PLACE = "rt/{}/place"
 LOOK = 0.1
 """Seconds between two looks at who is there."""
 MEET = 0.3
@@ -124,10 +90,10 @@ MEET = 0.3
 
 
 class Ros2:
-    """Topics and the mode service of 2016 under ROS 2's names, by DDS (a `protocols.Transport`).
+    """Topics of 2016 under ROS 2's names, by DDS (a `protocols.Transport`).
 
-    Twists carry no tick: in lockstep a peer shall publish exactly one for each `/gazebo/model_states`, which is the
-    last message of a frame.
+    Twists carry no tick: in lockstep a peer shall publish exactly one for each `/ego/odom`, which is the last message
+    of a frame.
 
     Parameters
     ----------
@@ -140,7 +106,7 @@ class Ros2:
     clock : bool
         Whether `/clock` is published and messages are stamped with simulated time; else with the wall clock's.
     rate : float
-        How many model states a second are published in real time, at least.
+        How many views of the world a second are published in real time, at least.
     """
 
     name = "ros2"
@@ -161,6 +127,7 @@ class Ros2:
         self._maestro, self._here = maestro, here
         self._readers: dict[str, Any] = {}
         self._there: dict[str, int] = {}
+        self._places: dict[str, Any] = {}
         self._looking = Lock()
         self._looked = 0.0
         self._open = False
@@ -173,13 +140,17 @@ class Ros2:
         with closing_if_refused(self.close):
             self._look_for_others()
         self._world = Ros2Publishers(self._graph, clock=self._clock)
-        self._services = MaestroServices(self._graph, mailbox, self._maestro)
+        self._topics = MaestroTopics(self._graph, mailbox, self._maestro)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
         """Listen to the drivers of the cars `remote`."""
         self._stamps.begin()
-        self._services.begin()
         self._world.begin(instance)
+        for car in sorted(set(instance.names).symmetric_difference(self._places)):
+            if car in self._places:
+                self._graph.drop(self._places.pop(car))
+            else:
+                self._places[car] = self._graph.reader(PLACE.format(car), m.PoseStamped)
         with self._looking:
             for car in [car for car in self._readers if car not in remote]:
                 self._graph.drop(self._readers.pop(car))
@@ -191,25 +162,30 @@ class Ros2:
 
     def announce(self, instance: Instance) -> None:
         """Publish the problem instance."""
-        self._services.announce(instance, moment(self._stamps.now()))
+        self._topics.announce(instance)
 
     def frame(self, view: View) -> None:
         """Publish a frame."""
-        self._publish(view, frame=True)
+        self._stamps.see(view)
+        self._world.publish(view, self._stamps.now(), self._stamps.simulated)
 
-    def stream(self, view: View) -> None:
-        """Publish what lies between two frames, or a world that stands still."""
-        self._publish(view, frame=False)
+    stream = frame
 
     def end(self, ending: Ending) -> None:  # noqa: ARG002  # in 2016 nobody was told why
         """Publish the empty instance that ends a trial."""
-        self._services.end(moment(self._stamps.now()))
+        self._topics.end()
 
     def receive(self, seconds: float) -> None:
         """Take what has come, or comes within so long."""
         if seconds > 0.0:
             self._graph.wait(seconds)
-        self._services.serve()
+        self._topics.serve()
+        for car, reader in self._places.items():
+            for message in self._graph.take(reader, m.PoseStamped, AT_ONCE):
+                position, turn = message.pose.position, message.pose.orientation
+                pose = placed(position.x, position.y, turn.z, turn.w)
+                if pose is not None:
+                    self._mailbox.place(car, pose)
         for car, reader in self._readers.items():
             for twist in self._graph.take(reader, m.Twist, AT_ONCE):
                 self._mailbox.command(car, twist.linear.x, twist.angular.z)
@@ -218,7 +194,7 @@ class Ros2:
             self.look()
 
     def look(self) -> None:
-        """Tell the mailbox who has come and gone, as far as DDS knows: of who was killed it knows after seconds."""
+        """Tell the mailbox who has come and gone."""
         with self._looking:
             for car, reader in self._readers.items():
                 there = self._graph.writers(reader)
@@ -233,11 +209,12 @@ class Ros2:
         if self._open:
             self._open = False
             self._readers.clear()
+            self._places.clear()
             self._graph.close()
 
     def _look_for_others(self) -> None:
         """See that nobody else tells problems here: two sessions would answer each other's drivers."""
-        probe = self._graph.reader(INSTANCE, m.ProblemInstanceJSON)
+        probe = self._graph.reader(INSTANCE, m.String)
         until = monotonic() + MEET
         while monotonic() < until:
             if self._graph.writers(probe):
@@ -247,7 +224,3 @@ class Ros2:
                 )
             sleep(0.02)
         self._graph.drop(probe)
-
-    def _publish(self, view: View, *, frame: bool) -> None:
-        self._stamps.see(view)
-        self._world.publish(view, self._stamps.now(), self._stamps.simulated, frame=frame)

@@ -1,4 +1,4 @@
-"""What a session publishes of its cars over ROS 2: model states, odometry, transforms, scans, labels, time."""
+"""What a session publishes of its cars over ROS 2: odometry, transforms, scans, labels, time."""
 
 from __future__ import annotations
 
@@ -6,20 +6,18 @@ from collections.abc import Callable
 from math import floor
 from typing import TYPE_CHECKING, Any
 
-from dubins_traffic.cars.state import State
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.parts import Laser
 from dubins_traffic.protocols import View
 from dubins_traffic.transports.labels import Caption
 from dubins_traffic.transports.ros import half
-from dubins_traffic.transports.ros1.world import BASE, ODOMETRY
+from dubins_traffic.transports.ros1.world import BASE
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
-MODEL_STATES = "rt/gazebo/model_states"
 LABELS = "rt/loutput"
 CLOCK = "rt/clock"
 TRANSFORMS = "rt/tf"
@@ -39,7 +37,6 @@ class Ros2Publishers:
     def __init__(self, graph: Graph, *, clock: bool) -> None:
         self._graph, self._clock = graph, clock
         self._writers: dict[str, Any] = {}
-        self._odometry_at = -1.0
 
     def begin(self, instance: Instance) -> None:
         """Take the cars of `instance`."""
@@ -49,28 +46,24 @@ class Ros2Publishers:
         self._senses = [Senses(instance, n, laser=self._laser) for n in range(len(instance.names))]
         self._swept = -1
 
-    def publish(self, view: View, stamp: float, simulated: float, *, frame: bool) -> None:
-        """Publish `view`, stamped so (seconds); the model states come last.
+    def publish(self, view: View, stamp: float, simulated: float) -> None:
+        """Publish `view`, stamped so (seconds); the ego's odometry comes last.
 
-        `frame`: it is a frame, and everything is sent. Lasers sweep by the time `simulated`.
+        Lasers sweep by the time `simulated`.
         """
         time = moment(stamp)
         if self._clock:
             self._put(CLOCK, m.Clock, lambda: m.Clock(time))
         self._caption.update(view.labels)
-        labels = m.LabelStamped(m.Header(time, "map"), self._caption.words)
-        self._put(LABELS, m.LabelStamped, lambda: labels, latched=True)
-        if frame or stamp - self._odometry_at >= ODOMETRY:
-            self._odometry_at = stamp
-            for n, name in enumerate(self._names):
-                self._put(f"rt/{name}/odom", m.Odometry, lambda n=n: self._odometry(view, n, time))
-            self._put(TRANSFORMS, m.TFMessage, lambda: self._transforms(view, time))
+        self._put(LABELS, m.String, lambda: m.String(" ".join(self._caption.words)), latched=True)
         sweep = floor(simulated * self._laser.rate + 1e-6)
         if sweep != self._swept:
             self._swept = sweep
             for n, name in enumerate(self._names):
                 self._put(f"rt/{name}/scan", m.LaserScan, lambda n=n: self._scan(view, n, time))
-        self._put(MODEL_STATES, m.ModelStates, lambda: self._states(view.state))
+        self._put(TRANSFORMS, m.TFMessage, lambda: self._transforms(view, time))
+        for n in reversed(range(len(self._names))):
+            self._put(f"rt/{self._names[n]}/odom", m.Odometry, lambda n=n: self._odometry(view, n, time))
 
     def _put(self, topic: str, kind: Any, make: Callable[[], Any], *, latched: bool = False) -> None:
         if topic not in self._writers:
@@ -78,10 +71,6 @@ class Ros2Publishers:
         writer = self._writers[topic]
         if latched or self._graph.heard(writer):
             self._graph.put(writer, make())
-
-    def _states(self, state: State) -> m.ModelStates:
-        count = len(self._names)
-        return m.ModelStates(list(self._names), _poses(state, count), _twists(state, count))
 
     def _odometry(self, view: View, n: int, stamp: m.Time) -> m.Odometry:
         name = self._names[n]
@@ -132,20 +121,6 @@ def _odometric(view: View, n: int) -> m.Pose:
     return _pose(*(float(row[0, n]) for row in view.state[:4]))
 
 
-def _poses(state: State, count: int) -> list[m.Pose]:
-    columns = [row[0, :count].tolist() for row in state[:4]]
-    return [_pose(*values) for values in zip(*columns, strict=True)]
-
-
 def _pose(x: float, y: float, c: float, s: float) -> m.Pose:
     z, w = half(c, s)
     return m.Pose(m.Point(x, y), m.Quaternion(0.0, 0.0, z, w))
-
-
-def _twists(state: State, count: int) -> list[m.Twist]:
-    """Return velocities in the world frame, as Gazebo gave them."""
-    columns = [row[0, :count].tolist() for row in (state.c, state.s, state.speed, state.yaw_rate)]
-    return [
-        m.Twist(m.Vector3(speed * c, speed * s), m.Vector3(z=yaw_rate))
-        for c, s, speed, yaw_rate in zip(*columns, strict=True)
-    ]

@@ -1,0 +1,168 @@
+"""Nodes of ROS 2 as people have it, with rclpy and Fast DDS of two versions, beside `dubins-traffic ros2 run`.
+
+`DUBINS_TRAFFIC_TRIALS_ROS2=50 pytest tests/integration/test_rclpy.py` runs the full count.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("cyclonedds")
+
+import dubins_traffic as dt
+from dubins_traffic.transports.ros2 import messages as m
+from dubins_traffic.transports.ros2.graph import LAST_DOMAIN
+from tests.tools import interpreter_with
+
+pytestmark = pytest.mark.tools
+
+ROOT = Path(__file__).resolve().parents[2]
+COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
+NODE = str(ROOT / "examples" / "ros2" / "node.py")
+VERSIONS = ("jazzy", "kilted")
+TRIALS = os.environ.get("DUBINS_TRAFFIC_TRIALS_ROS2", "3")
+DOMAINS = itertools.count(LAST_DOMAIN - 6 * (os.getpid() % 15), -1)
+PATIENCE = 900
+
+
+@contextmanager
+def beside(domain: int, *command: str) -> Iterator[subprocess.Popen[str]]:
+    environment = {name: value for name, value in os.environ.items() if not name.startswith(("ROS_", "RMW_"))}
+    process = subprocess.Popen(
+        command,
+        env=environment | {"ROS_DOMAIN_ID": str(domain)},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),  # noqa: PLW1509  # it takes no lock
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate(timeout=PATIENCE)
+
+
+def session(config: str, *more: str) -> tuple[str, ...]:
+    return (COMMAND, "ros2", "run", config, "--seed", "1", "--json", *more)
+
+
+@pytest.fixture
+def config(tmp_path: Path) -> str:
+    document = dt.load_config("demo").to_document() | {"duration_bounds": [4, 4]}
+    (tmp_path / "short.json").write_text(json.dumps(document))
+    return str(tmp_path / "short.json")
+
+
+def ends(process: subprocess.Popen[str]) -> list[str]:
+    out, err = process.communicate(timeout=PATIENCE)
+    assert out, err
+    return [trial["end"] for trial in json.loads(out)["trials"]]
+
+
+def ended_by_ctrl_c(node: subprocess.Popen[str]) -> None:
+    """See that a node has printed nothing that it should not: no warning, no error."""
+    node.send_signal(signal.SIGINT)
+    out, err = node.communicate(timeout=PATIENCE)
+    assert (out, err) == ("interrupted\n", "")
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_types_have_the_hashes_of_ros_2(version: str) -> None:
+    share = Path(interpreter_with(version)).parents[1] / "share"
+    kinds = [kind for kind in vars(m).values() if "::" in getattr(kind, "__idl_typename__", "")]
+    compared = 0
+    for kind in kinds:
+        package, group, _, name = kind.__idl_typename__.split("::")
+        told = share / package / group / f"{name.removesuffix('_')}.json"
+        if told.exists() and package != "rmw_dds_common":  # bounds of its texts are left out
+            assert json.loads(told.read_text())["type_hashes"][0]["hash_string"] == m.type_hash(kind)
+            compared += 1
+    assert compared >= 12
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_node_drives_trial_after_trial(version: str, config: str, tmp_path: Path) -> None:
+    domain, python = next(DOMAINS), interpreter_with(version)
+    arguments = session(
+        config, "--lockstep", "--deadline", "60", "--trials", TRIALS, "--records", str(tmp_path / "out")
+    )
+    with beside(domain, *arguments) as run, beside(domain, python, NODE) as node:
+        assert ends(run) == ["duration"] * int(TRIALS)
+        ended_by_ctrl_c(node)
+    driven = {float(dt.load_record(path).frames.x[-1, 0]) for path in (tmp_path / "out").glob("*.mcap")}
+    assert len(driven) > 1
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_session_is_seen_as_a_node(version: str) -> None:
+    domain, python = next(DOMAINS), interpreter_with(version)
+    with (
+        beside(domain, *session("demo", "--trials", "1")) as run,
+        beside(domain, python, str(ROOT / "tests" / "rclpy_look.py"), "/ego/odom") as look,
+    ):
+        out, err = look.communicate(timeout=PATIENCE)
+        assert err == ""
+        seen = json.loads(out)
+        run.send_signal(signal.SIGINT)
+        run.communicate(timeout=PATIENCE)
+    assert "dubins_traffic" in seen["nodes"]
+    ((kind, told),) = seen["publishers"]
+    assert kind == "nav_msgs/msg/Odometry"
+    assert m.type_hash(m.Odometry) in told or "TypeHash" in told
+    assert not [name for name, _ in seen["services"] if "maestro" in name]
+
+
+def test_two_sessions_in_two_domains(tmp_path: Path) -> None:
+    """With the default settings of both versions, in real time: they don't hear each other."""
+    documents: dict[str, Any] = {}
+    for version, seconds in zip(VERSIONS, (4, 6), strict=True):
+        documents[version] = dt.load_config("demo").to_document() | {"duration_bounds": [seconds, seconds]}
+        (tmp_path / f"{version}.json").write_text(json.dumps(documents[version]))
+    first, second = next(DOMAINS), next(DOMAINS)
+    with (
+        beside(first, *session(str(tmp_path / "jazzy.json"), "--trials", "2")) as one,
+        beside(second, *session(str(tmp_path / "kilted.json"), "--trials", "2")) as other,
+        beside(first, interpreter_with("jazzy"), NODE) as node,
+        beside(second, interpreter_with("kilted"), NODE) as another,
+    ):
+        assert ends(one) == ["duration"] * 2
+        assert ends(other) == ["duration"] * 2
+        ended_by_ctrl_c(node)
+        ended_by_ctrl_c(another)
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_a_killed_node_is_lost_at_once(version: str, tmp_path: Path) -> None:
+    """DDS itself would notice after twenty seconds; the silence that is borne here is longer."""
+    domain, python = next(DOMAINS), interpreter_with(version)
+    document = dt.load_config("demo").to_document() | {"duration_bounds": [1000, 1000]}
+    (tmp_path / "long.json").write_text(json.dumps(document))
+    arguments = session(str(tmp_path / "long.json"), "--trials", "1", "--silence", "900")
+    with beside(domain, *arguments) as run, beside(domain, python, NODE) as node:
+        assert run.stderr is not None
+        for line in run.stderr:
+            if "first command" in line:
+                break
+        time_in = subprocess.run(
+            [python, str(ROOT / "tests" / "rclpy_look.py"), "/ego/mobile_base/commands/velocity"],
+            env=os.environ | {"ROS_DOMAIN_ID": str(domain)},
+            check=True,
+            capture_output=True,
+            timeout=PATIENCE,
+        )
+        assert b"geometry_msgs/msg/Twist" in time_in.stdout
+        node.kill()
+        assert ends(run) == ["peer_lost"]
