@@ -391,11 +391,21 @@ return false;"""
 """Whether 30 pixels in a row of the scale's colour, the lowest of all, lie beside or above the toggles."""
 
 
+SHARPNESS = "const map = document.getElementById('map'); return map.width / map.getBoundingClientRect().width"
+
+
+def show_at(page: webdriver.Chrome, size: dict[str, float]) -> None:
+    """Show the page on such a screen, and wait until its map is drawn for that one's pixels."""
+    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
+    ratio = pytest.approx(size["deviceScaleFactor"], rel=0.01)
+    WebDriverWait(page, 600).until(lambda _: page.execute_script(SHARPNESS) == ratio)
+
+
 @pytest.mark.parametrize("width", [360, 400, 820, 1280])
 def test_fits_any_width_in_light_and_dark(page: webdriver.Chrome, width: int) -> None:
     size = {"width": width, "height": 780, "deviceScaleFactor": 2, "mobile": width < 600}
-    page.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
     try:
+        show_at(page, size)
         assert page.execute_script("return document.documentElement.scrollWidth") <= width
         assert element(page, "play").is_displayed()
         assert page.execute_script(
@@ -408,6 +418,14 @@ def test_fits_any_width_in_light_and_dark(page: webdriver.Chrome, width: int) ->
         element(page, "theme").click()
         assert page.execute_script("return document.documentElement.dataset.theme") == "dark"
         assert page.execute_script(PICTURE) != light
+    finally:
+        page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+
+
+def test_is_drawn_anew_for_a_screen_of_other_pixels(page: webdriver.Chrome) -> None:
+    try:
+        for ratio in (1, 3, 2):
+            show_at(page, {"width": 820, "height": 780, "deviceScaleFactor": ratio, "mobile": False})
     finally:
         page.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 

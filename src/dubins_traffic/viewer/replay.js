@@ -315,6 +315,10 @@ listenToKeys();
 map.recolour();
 new ResizeObserver(layOut).observe(find("stage"));
 window.addEventListener("resize", layOut);
+// Not every browser tells when only the ratio has changed, as for a window that is moved to another screen.
+setInterval(() => {
+  if ((window.devicePixelRatio || 1) !== map.ratio) layOut();
+}, 500);
 layOut();
 refresh();
 
