@@ -24,6 +24,7 @@ from scipy.sparse.csgraph import connected_components
 
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
+from dubins_traffic.synthesis import answer as answering
 from dubins_traffic.synthesis.answer import answer
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.exhaustive import (
@@ -481,9 +482,12 @@ def test_the_command_tells_who_wins(
     assert play["format"] == "dubins-traffic counter-play"
     assert list(turns_of(play))[play["again"]] == list(turns_of(play))[-1]
     assert main([*line, "--check", str(bad), "--counter-play", "play.json"]) == 2
+    capsys.readouterr()
+    assert main(["synth", "demo", "--cars", "1", "--check", str(good)]) == 2
+    assert str(good) in capsys.readouterr().err
+    monkeypatch.setattr(answering, "answer", None)  # a file is read before the game is solved
     assert main([*line, "--check", "missing.hoa"]) == 2
     assert main([*line, "--check", "road.json"]) == 2
-    assert main(["synth", "demo", "--cars", "1", "--check", str(good)]) == 2
 
 
 def standing() -> tuple[int, dict[tuple[int, int], int]]:

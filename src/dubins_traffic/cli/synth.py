@@ -125,7 +125,7 @@ def synth(
     """
     from dubins_traffic.files import write_text
     from dubins_traffic.synthesis.answer import answer
-    from dubins_traffic.synthesis.exhaustive import check_strategy
+    from dubins_traffic.synthesis.exhaustive import check_strategy, read_strategy
     from dubins_traffic.synthesis.game import save_game
     from dubins_traffic.synthesis.instance import start_cells
     from dubins_traffic.synthesis.specification import specification_text
@@ -135,6 +135,7 @@ def synth(
     if counter_play is not None and check is None:
         raise InputError("no strategy to be checked", file="--counter-play", expected="--check STRATEGY")
     instance = _instance(source, seed, trial)
+    held = None if check is None else read_strategy(check)
     with _progress() as progress:
         found = answer(
             instance,
@@ -146,7 +147,10 @@ def synth(
         )
         reasons = found.explain(progress) if explain else []
         game = found.solution.game
-        checked = None if check is None else check_strategy(check, game, instance, progress)
+        try:
+            checked = None if held is None else check_strategy(held, game, instance, progress)
+        except InputError as error:
+            raise error if error.file else error.within(file=str(check)) from None
     if graph is not None:
         save_game(game, graph, overwrite=overwrite)
     if spec is not None:

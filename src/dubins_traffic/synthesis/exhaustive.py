@@ -20,6 +20,7 @@ import numpy as np
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.synthesis.archive import SUFFIXES
+from dubins_traffic.synthesis.foreign.machine import Machine
 from dubins_traffic.synthesis.foreign.player import (
     Answer,
     Labelled,
@@ -204,10 +205,18 @@ class _Graph:
     """The nodes at which plays end, the place that the environment made, and why."""
 
 
+def read_strategy(path: str | Path) -> Machine | Strategy:
+    """Return the strategy in a file, ours or another tool's; InputError if there is none."""
+    return Strategy.load(path) if Path(path).suffix in SUFFIXES else read_machine(path)
+
+
 def check_strategy(
-    path: str | Path, game: Game, instance: Instance, progress: Progress | None = None
+    strategy: str | Path | Machine | Strategy,
+    game: Game,
+    instance: Instance,
+    progress: Progress | None = None,
 ) -> Check:
-    """Play the strategy in a file, ours or another tool's, from where an instance starts, as `check_player` does.
+    """Play a strategy, read from a file or to be read, from where an instance starts, as `check_player` does.
 
     Raises
     ------
@@ -216,11 +225,9 @@ def check_strategy(
         or two in one cell; and as `check_player`.
     """
     board = game.board
+    held = read_strategy(strategy) if isinstance(strategy, str | Path) else strategy
     named = Labelled(board, MoveList(board))
-    try:
-        player = _player(path, game, named)
-    except InputError as error:
-        raise error if error.file else error.within(file=str(path)) from None
+    player = _player(held, game, named)
     cells = tuple(start_cells(board, instance))
     starts = [PlayPosition(position, cells) for position in start_positions(board, instance)]
     if isinstance(player, MachinePlayer):
@@ -228,13 +235,11 @@ def check_strategy(
     return check_player(game, player, named, starts, progress)
 
 
-def _player(path: str | Path, game: Game, named: Labelled) -> Player:
+def _player(strategy: Machine | Strategy, game: Game, named: Labelled) -> Player:
     board = game.board
-    if Path(path).suffix not in SUFFIXES:
-        machine = read_machine(path)
-        check_fit(board, machine)
-        return MachinePlayer(named, machine)
-    strategy = Strategy.load(path)
+    if not isinstance(strategy, Strategy):
+        check_fit(board, strategy)
+        return MachinePlayer(named, strategy)
     strategy.check_fit(board.road_cells, board.others)
     if strategy.board.assumption != board.assumption:
         raise InputError(
