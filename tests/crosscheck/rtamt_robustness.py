@@ -1,20 +1,25 @@
 """Robustness by rtamt; run by an interpreter that has it.
 
-Reads ``{"period_ms": n, "signals": {name: [...]}, "formulas": [...]}`` from the standard input and writes the value of
-every formula at every frame; infinities as ``Infinity``.
+Reads a list of ``{"period_ms": n, "signals": {name: [...]}, "formulas": [...]}`` from the standard input and writes for
+each the value of every formula at every frame; infinities as ``Infinity``.
 """
 
 from __future__ import annotations
 
 import json
 import sys
+from typing import Any
 
 
 def main() -> None:
-    """Answer one request."""
+    """Answer the requests."""
+    sys.stdout.write("\n" + json.dumps([answer(request) for request in json.load(sys.stdin)]) + "\n")
+
+
+def answer(request: Any) -> list[list[float]]:
+    """Return the values of the formulas of one request."""
     import rtamt
 
-    request = json.load(sys.stdin)
     signals = request["signals"]
     frames = len(next(iter(signals.values())))
     answers: list[list[float]] = []
@@ -28,7 +33,7 @@ def main() -> None:
         spec.parse()
         data = {"time": [frame * request["period_ms"] / 1000 for frame in range(frames)]}
         answers.append([float(value) for _, value in spec.evaluate(data | signals)])
-    sys.stdout.write("\n" + json.dumps(answers) + "\n")
+    return answers
 
 
 if __name__ == "__main__":

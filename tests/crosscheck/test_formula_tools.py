@@ -100,7 +100,8 @@ def test_robustness_as_rtamt_computes_it() -> None:
             "signals": {name: signal.tolist() for name, signal in signals.items()},
             "formulas": texts,
         }
-        for formula, expected in zip(formulas, asked("rtamt", "rtamt_robustness.py", request), strict=True):
+        (answer,) = asked("rtamt", "rtamt_robustness.py", [request])
+        for formula, expected in zip(formulas, answer, strict=True):
             assert np.array_equal(robustness(formula, signals, period), expected), formula
 
 

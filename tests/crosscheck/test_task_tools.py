@@ -26,7 +26,10 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import read
 from dubins_traffic.rules.valuation import Valuation
+from dubins_traffic.rules.vocabulary import Vocabulary
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.scoring.signals import Signals
+from dubins_traffic.specifications.exports import Specification, stl
 from dubins_traffic.specifications.task import task
 from tests.crosscheck.test_formula_tools import asked, spin_output
 from tests.formulas import holds
@@ -181,7 +184,7 @@ def test_rtamt_measures_the_task_on_a_recorded_trial(
         "signals": {name: signal.tolist() for name, signal in signals.items()},
         "formulas": [text],
     }
-    (answer,) = asked("rtamt", "rtamt_robustness.py", request)
+    ((answer,),) = asked("rtamt", "rtamt_robustness.py", [request])
     joint = parse(spec(small, *part))
     assert np.array_equal(robustness(joint, signals, 0.1), answer)
     monitors = Monitors({f"{k}": one for side in sides for k, one in enumerate(side)}, names, 0.1)
@@ -190,6 +193,48 @@ def test_rtamt_measures_the_task_on_a_recorded_trial(
         monitors.update(row[None, :])
     if part:
         assert (answer[0] > 0) == bool((monitors.verdicts >= PRESUMABLY_TRUE).all())
+
+
+ASKED = {
+    "lane": "[] !left_ego",
+    "road": "[] on_road_rogue0",
+    "soon": "<>[0,6] ego_t_0_1",
+    "back": "[][0,4] (left_ego -> <>[0,3] !left_ego)",
+    "first": "(!ego_t_0_1 U[0,8] ego_t_2_1) | [][0,8] !collision_ego",
+}
+
+
+@pytest.mark.tools
+def test_rtamt_measures_what_is_asked_of_fifty_records(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The formulas end within whole trials, so that what may come after counts in none; both are given the measures."""
+    monkeypatch.chdir(tmp_path)
+    formulas = {name: parse(text) for name, text in ASKED.items()}
+    names = sorted({name for formula in formulas.values() for name in propositions(formula)})
+    texts = [stl(Specification((), (formula,), tuple(names), ()), 0.1) for formula in formulas.values()]
+    requests: list[Any] = []
+    for number in range(50):
+        instance = replace(draw(load_config(SMALL), 7, number), duration=10.0)
+        path = f"{number:02}.mcap"
+        run_trial(instance, "lanes" if number % 2 else "simple", record=path)
+        kept = read(path)
+        vocabulary = Vocabulary(instance.problem, instance.names)
+        signals = Signals(kept.instance, {name: vocabulary[name] for name in names})
+        signals.take(kept.frames, Valuation(kept.instance, names).values(kept.frames))
+        measures = {name: signal.tolist() for name, signal in signals.result().items()}
+        requests.append({"period_ms": 100, "signals": measures, "formulas": texts})
+    capsys.readouterr()
+    asking = [word for name, text in ASKED.items() for word in ("--formula", f"{name}={text}")]
+    assert main(["check", *(f"{number:02}.mcap" for number in range(50)), *asking, "--json"]) in (0, 1)
+    told = [
+        [np.inf if found["robustness"] is None else found["robustness"] for found in record["formulas"]]
+        for record in json.loads(capsys.readouterr().out)["records"]
+    ]
+    answers = asked("rtamt", "rtamt_robustness.py", requests)
+    expected = [[row[0] for row in answer] for answer in answers]
+    assert np.allclose(told, expected, rtol=0.0, atol=1e-6)
+    assert {-1.0, 1.0} <= set(np.sign(expected).ravel())
 
 
 @pytest.mark.tools
