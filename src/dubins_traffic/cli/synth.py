@@ -147,10 +147,7 @@ def synth(
         )
         reasons = found.explain(progress) if explain else []
         game = found.solution.game
-        try:
-            checked = None if held is None else check_strategy(held, game, instance, progress)
-        except InputError as error:
-            raise error if error.file else error.within(file=str(check)) from None
+        checked = None if check is None else check_strategy(check, game, instance, progress, held)
     if graph is not None:
         save_game(game, graph, overwrite=overwrite)
     if spec is not None:

@@ -211,12 +211,15 @@ def read_strategy(path: str | Path) -> Machine | Strategy:
 
 
 def check_strategy(
-    strategy: str | Path | Machine | Strategy,
+    path: str | Path,
     game: Game,
     instance: Instance,
     progress: Progress | None = None,
+    held: Machine | Strategy | None = None,
 ) -> Check:
-    """Play a strategy, read from a file or to be read, from where an instance starts, as `check_player` does.
+    """Play the strategy in a file, ours or another tool's, from where an instance starts, as `check_player` does.
+
+    `held` is what `read_strategy` has returned of the file, if it has been read.
 
     Raises
     ------
@@ -225,9 +228,11 @@ def check_strategy(
         or two in one cell; and as `check_player`.
     """
     board = game.board
-    held = read_strategy(strategy) if isinstance(strategy, str | Path) else strategy
     named = Labelled(board, MoveList(board))
-    player = _player(held, game, named)
+    try:
+        player = _player(read_strategy(path) if held is None else held, game, named)
+    except InputError as error:
+        raise error if error.file else error.within(file=str(path)) from None
     cells = tuple(start_cells(board, instance))
     starts = [PlayPosition(position, cells) for position in start_positions(board, instance)]
     if isinstance(player, MachinePlayer):
