@@ -22,6 +22,7 @@ pytest.importorskip("lcm", reason="LCM's wheel needs libglib2.0-0: scripts/syste
 import lcm as library
 
 import dubins_traffic as dt
+from tests.beside import running
 from tests.conformance.test_lcm import free_url
 from tests.conformance.transport import frames
 from tests.tools import program
@@ -58,19 +59,6 @@ def url(monkeypatch: pytest.MonkeyPatch) -> str:
     made = free_url()
     monkeypatch.setenv("LCM_DEFAULT_URL", made)
     return made
-
-
-@contextmanager
-def running(*command: str) -> Iterator[subprocess.Popen[str]]:
-    """Run a program; it is gone afterwards, whatever happens."""
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.send_signal(signal.SIGCONT)
-            process.kill()
-        process.communicate(timeout=600)
 
 
 def ended(process: subprocess.Popen[str], seconds: float = 600.0) -> tuple[int, str, str]:

@@ -9,8 +9,6 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +21,7 @@ from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.runs.single import Trial, run_trial
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
+from tests.beside import running
 from tests.conformance.transport import frames
 from tests.ros2_client import READY, RESET, RESTART, START, Client, law
 from tests.tools import need, program
@@ -64,17 +63,6 @@ def config(tmp_path: Path) -> str:
     return str(tmp_path / "short.json")
 
 
-@contextmanager
-def running(*command: str) -> Iterator[subprocess.Popen[str]]:
-    process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
-    try:
-        yield process
-    finally:
-        if process.poll() is None:
-            process.kill()
-        process.communicate(timeout=600)
-
-
 def reference(config: str, tmp_path: Path) -> tuple[bytes, Any]:
     instance = dt.draw(dt.load_config(config), 1, 0)
     run_trial(instance, Law(), record=tmp_path / "here.mcap")
@@ -97,7 +85,7 @@ def test_peers_are_counted_while_others_come_and_go(domain: int) -> None:
     thread = threading.Thread(target=come_and_go)
     thread.start()
     try:
-        for _ in range(20_000):
+        for _ in range(100_000):
             assert graph.heard(writer)
             assert graph.writers(reader) >= 1
     finally:

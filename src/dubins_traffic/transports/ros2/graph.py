@@ -126,17 +126,12 @@ class Graph:
         DDS misses a process that was killed after 10 or 20 seconds; if it was on this machine, its socket is gone.
         """
         writers = listed(reader.get_matched_publications)
-        if not (self._here and writers):
-            return len(writers)
-        try:
-            ports = {
-                int(line.split()[1].partition(":")[2], 16) for line in SOCKETS.read_text().splitlines()[1:]
-            }
-        except OSError:
-            return len(writers)
-        gone = [writer for writer in writers if self._port(reader, writer) not in ports | {UNKNOWN}]
-        self._ports |= dict.fromkeys(gone, GONE)  # another process may take its port
-        return len(writers) - len(gone)
+        ports = {writer: self._port(reader, writer) for writer in writers} if self._here else {}
+        if any(port > 0 for port in ports.values()):
+            bound = bound_ports()
+            gone = [writer for writer, port in ports.items() if port > 0 and port not in bound]
+            self._ports |= dict.fromkeys(gone, GONE)  # another process may take its port
+        return sum(self._ports.get(writer) != GONE for writer in writers)
 
     def _port(self, reader: Any, writer: int) -> int:
         """Return the port at which the participant of a writer listens, UNKNOWN if it is this one or does not tell."""
@@ -194,6 +189,15 @@ def _domain(domain: int, *, here: bool) -> Domain | None:
 
 def _gid(entity: Any) -> m.Gid:
     return m.Gid(list(entity.guid.bytes))
+
+
+def bound_ports() -> frozenset[int]:
+    """Return the ports at which somebody on this machine listens by UDP; all, where the system does not tell."""
+    try:
+        sockets = SOCKETS.read_text().splitlines()[1:]
+    except OSError:
+        return frozenset(range(1 << 16))
+    return frozenset(int(line.split()[1].partition(":")[2], 16) for line in sockets)
 
 
 def listed(matched: Callable[[], Sequence[int]]) -> Sequence[int]:
