@@ -13,6 +13,9 @@ CONTRACT = CASES / "contract"
 """What broke the contract once: who blocked `rules`, and who was provoked by an ego that stands, or that does
 anything under the shield."""
 
+WIDE = CASES.parent / "wide_cases"
+"""What did so among so many cars, none of which could be left out."""
+
 
 def test_rules_passes_the_cases_of_its_mutants() -> None:
     assert [own.file.name for own in outcomes(cases_in(CASES / "rules"), "rules") if not own.passed] == []
@@ -25,7 +28,7 @@ def test_the_shield_passes_the_cases_of_lanes() -> None:
 
 
 def test_rules_gets_past_who_stands_askew_beside_it() -> None:
-    """It waited for good beside a car a few millimetres behind it, which moved while it was being passed."""
+    """It waited for good beside a car that moved while it was being passed, behind it or where it would return."""
     assert [
         own.file.name for own in outcomes(cases_in(CONTRACT / "blocked"), "rules") if not own.passed
     ] == []
@@ -42,6 +45,12 @@ def test_who_keeps_the_law_leaves_discs_in_time_beside_an_ego_that_does_as_it_li
     found = list(outcomes(cases_in(CONTRACT / "egos"), Free))
     assert len(found) == 9
     assert [own.file.name for own in found if not own.passed] == []
+
+
+def test_who_keeps_the_law_takes_a_near_exit_when_its_own_is_taken_late() -> None:
+    """It turned back across the whole crossing, and did not get out in time (E4)."""
+    (own,) = outcomes(cases_in(WIDE), Free)
+    assert own.passed
 
 
 @pytest.mark.parametrize("controller", ["lanes", "simple"])

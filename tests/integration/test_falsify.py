@@ -61,6 +61,21 @@ def test_the_page_of_a_search_tells_what_its_report_does(found: Path) -> None:
     assert all((found / link).is_file() for link in links)
 
 
+def test_as_many_trials_are_proposed_at_a_time_as_a_search_is_told(tmp_path: Path) -> None:
+    whole: list[int] = []
+    dt.falsify(
+        a_minute("junction"), "simple", tmp_path / "few", trials=96, seed=1, duration=8.0, most=24,
+        progress=lambda own: whole.append(own.counts.trials),
+    )  # fmt: skip
+    assert sorted(set(whole)) == [0, 24, 48, 72, 96]
+    with pytest.raises(dt.InputError, match="another search"):
+        dt.falsify(
+            a_minute("junction"), "simple", tmp_path / "few", trials=120, seed=1, duration=8.0, resume=True
+        )
+    with pytest.raises(dt.InputError, match=r"most.*at least 1"):
+        dt.falsify(a_minute("junction"), "simple", tmp_path / "none", trials=96, most=0)
+
+
 def _simple() -> dt.Controller:
     from dubins_traffic.controllers.registry import load
 

@@ -1,12 +1,12 @@
-"""The columns of every score, in the orders of tables and of reports; each stands beside its metric."""
+"""The columns of every score, in the orders of tables and of reports; each stands beside what it is a column of."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Final
 
+from dubins_traffic.campaign import verdict_columns
 from dubins_traffic.scoring import (
-    breaches,
     collisions,
     driving,
     duration,
@@ -25,7 +25,7 @@ _PARTS = (
     collisions.COLUMNS,
     interventions.COLUMNS,
     formulas.COLUMNS,
-    breaches.COLUMNS,
+    verdict_columns.COLUMNS,
     paper.COLUMNS,
     icra2016.COLUMNS,
 )

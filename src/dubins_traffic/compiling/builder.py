@@ -133,9 +133,11 @@ def _compile(compiler: Compiler, wish: beside.Wish) -> None:
             raise ImportError(f"{wish.file} is another than that which runs")
         code, answer = compiler.machine_code(compiler.kernel(found, wish.name), kinds, symbol(key))
         store.save(wish.path, answer, code)
-    except Exception:
+    except Exception as error:
+        # Numba's messages end with a line of source: the last line of what is told says what is wrong.
+        told = f"{traceback.format_exc()}{type(error).__name__}: {' '.join(str(error).split())[:300]}"
         with contextlib.suppress(OSError):
-            store.write_whole(wish.failure, traceback.format_exc().encode())
+            store.write_whole(wish.failure, told.encode())
 
 
 if __name__ == "__main__":

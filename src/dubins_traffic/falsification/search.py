@@ -137,7 +137,7 @@ def _story(score: Score, name: str) -> Story:
 
 
 GENERATION: Final = 128
-"""Most trials that are proposed at a time, whoever runs them."""
+"""Most trials that are proposed at a time, whoever runs them, unless a search is told otherwise."""
 SMALL: Final = 32
 SHARE: Final = 8
 """A generation is no more than one of so many parts of the trials before it, or `SMALL`."""
@@ -167,6 +167,8 @@ class Search:
         Who runs the trials.
     progress : callable, optional
         Is told of it whenever trials are finished.
+    most : int
+        How many trials are proposed at a time.
 
     Attributes
     ----------
@@ -185,8 +187,9 @@ class Search:
         targets: Sequence[str],
         crew: Runner,
         progress: Progress | None = None,
+        most: int = GENERATION,
     ) -> None:
-        self.archive, self.counts = archive, Counts()
+        self.archive, self.counts, self.most = archive, Counts(), most
         self._settings, self._source, self._strategy = settings, source, strategy
         self._targets, self._crew, self._progress = tuple(targets), crew, progress
         self._expected: set[int] = set()
@@ -200,7 +203,7 @@ class Search:
     def generation(self, most: int) -> None:
         """Try the next trials, at most `most`; whatever interrupts it, they are taken over whole or not at all."""
         first = self.counts.trials
-        size = min(GENERATION, max(SMALL, first // SHARE // SMALL * SMALL))
+        size = min(self.most, max(SMALL, first // SHARE // SMALL * SMALL))
         numbers = range(first, first + min(size, most))
         genomes = self._strategy.propose(numbers)
         instances = self._source.build(genomes)
@@ -352,6 +355,7 @@ def falsify(
     ray: str | None = None,
     resume: bool = False,
     progress: Progress | None = None,
+    most: int = GENERATION,
 ) -> Found:
     """Search for trials in which an ego breaks the rules while all others keep the assumption.
 
@@ -394,7 +398,9 @@ def falsify(
         Whether to go on with what has been begun in `folder`.
     progress : callable, optional
         Is told whenever trials are finished: of a slow controller's one by one (`Search.finished`).
-
+    most : int
+        How many trials are proposed at a time. A controller in Python is asked in all of them together, so more are
+        quicker; what is found in them guides the search only afterwards.
 
     Raises
     ------
@@ -403,6 +409,10 @@ def falsify(
     KeyboardInterrupt
         On Ctrl-C; what has been found is kept, and no trial that is finished is run again by `resume`.
     """
+    if most < 1:
+        raise InputError(
+            "not so many trials", file="falsify", field="most", value=most, expected="at least 1"
+        )
     if seconds is not None and not seconds >= 0.0:
         raise InputError("not a time", file="--seconds", value=seconds, expected="a number >= 0")
     own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
@@ -414,7 +424,7 @@ def falsify(
     settings = {
         "configuration": hashlib.sha256(json.dumps(own.to_document(), sort_keys=True).encode()).hexdigest(),
         "controller": name, "targets": list(targets), "seed": seed, "strategy": strategy,
-    }  # fmt: skip
+    } | ({} if most == GENERATION else {"most": most})  # fmt: skip
     source = Source(own, seed, frees=PROVOKED not in targets)
     check_targets(targets, source)
     proposing = make(strategy, source, targets)
@@ -423,7 +433,7 @@ def falsify(
         runner_of(controller, name, workers, ray) as crew,
         heard_between_frames(),
     ):
-        search = Search(archive, settings, source, proposing, targets, crew, progress)
+        search = Search(archive, settings, source, proposing, targets, crew, progress, most)
         if archive.state() is None:
             search.save()
         try:
@@ -439,7 +449,7 @@ def _run(search: Search, trials: int | None, seconds: float | None) -> None:
     while (trials is None or search.counts.trials < trials) and (
         seconds is None or time.monotonic() - began < seconds
     ):
-        search.generation(GENERATION if trials is None else trials - search.counts.trials)
+        search.generation(search.most if trials is None else trials - search.counts.trials)
         if time.monotonic() - saved > SAVE:
             search.save()
             saved = time.monotonic()

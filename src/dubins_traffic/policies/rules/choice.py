@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.barred import has_place, stands_in_disc
 from dubins_traffic.policies.rules.exits import BARRED, NO_WAY, cheapest, price_exits, ticks_of
 from dubins_traffic.policies.rules.kept import KeptPath
 from dubins_traffic.policies.rules.room import has_room, is_clear, is_free, is_open, room_in
-from dubins_traffic.policies.rules.tables import Traffic
+from dubins_traffic.policies.rules.tables import Driver, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import PART
-from dubins_traffic.roads.lookup import INFINITE, lane_end
+from dubins_traffic.roads.lookup import INFINITE, lane_coordinates, lane_end
 
 STUCK = 2.0
 """Seconds for which an e-agent in a disc waits for its exit before it takes another. The ego keeps its exit: it owes
@@ -17,6 +19,8 @@ no E4, and on the way to another it might leave the disc outside its lane."""
 LATE = 1.0
 """A car that has been in a crossing for this long, seconds, keeps its exit while that is open, even if there may be no
 room behind the cars there: on the way to another exit it might not leave the disc in time."""
+HASTE = 1e3
+"""Cost of a metre to an exit for such a car, metres: more than any way on from there counts."""
 
 SOON = 0.5
 """Within this distance of a bend, metres, a car is about to enter it."""
@@ -37,6 +41,8 @@ def take_another(b: int, n: int, tick: int, budget: float, traffic: Traffic) -> 
     v = lane_end(roads, net, car.lane)
     row = roads.vert_off[net] + v
     price_exits(b, n, tick, traffic)
+    if is_late(car, drivers.vehicle[b]):
+        prefer_near(b, n, row, drivers.vehicle[b], traffic)
     wanted = 0.0
     least = INFINITE
     for k in range(roads.degree[row]):
@@ -53,6 +59,27 @@ def take_another(b: int, n: int, tick: int, budget: float, traffic: Traffic) -> 
     if best >= 0:
         car.next_lane = best
     return best >= 0
+
+
+@jit_inline
+def is_late(car: Driver, vehicle: Vehicle) -> bool:
+    """Tell whether a car has been in a crossing for longer than `LATE`."""
+    return car.within > ticks_of(LATE, vehicle)
+
+
+@jit_rare
+def prefer_near(b: int, n: int, row: int, vehicle: Vehicle, traffic: Traffic) -> None:
+    """Let a car that has little time left prefer near exits of the intersection at `row` (row).
+
+    From one side of a crossing to the other it might not get out in time (E4).
+    """
+    state, roads, drivers, scratch = traffic.state, traffic.roads, traffic.drivers, traffic.scratch
+    for k in range(roads.degree[row]):
+        along, left = lane_coordinates(
+            roads, drivers.net[b], int(roads.arms[row, k]), state.x[b, n], state.y[b, n]
+        )
+        along, left = along - vehicle.disc, left + vehicle.middle
+        scratch.cost[k] += HASTE * sqrt(along * along + left * left)
 
 
 @jit_rare
@@ -206,8 +233,7 @@ def find_way_out(b: int, n: int, tick: int, part: int, traffic: Traffic) -> None
         car.within += 1
         if tick % CHOICES != 0 or has_room(b, n, car.next_lane, 0, traffic):
             return
-        late = car.within > ticks_of(LATE, vehicle)
-        if late and is_open(b, n, car.next_lane, traffic):
+        if is_late(car, vehicle) and is_open(b, n, car.next_lane, traffic):
             return
     wanted = car.next_lane
     turn_elsewhere(b, n, tick, traffic)

@@ -30,6 +30,8 @@ CREEPS, SLIDES = 0.05, 0.2
 """A car that has to return and may not drive faster than the first goes straight to the right at the second, m/s."""
 SQUARE = 0.999
 """Sine of the angle at which it does."""
+SLIGHT = 0.1
+"""A car farther left of its way than this, metres, drives on straight where another one bars its way back."""
 GAIN = 8.0
 """Yaw rate for each unit of the sine of that angle, 1/s."""
 
@@ -79,11 +81,12 @@ def move(
         pose = Pose(state.x[b, n], state.y[b, n], *heading(Line(left - offset, px, py, allowed), steep))
         safe = is_safe_from(pose, b, Command(allowed, 0.0), near, trusted, traffic, vehicle)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
+    slants = outside and offset == 0.0 and left > SLIGHT
     if returns and near > 0 and vehicle.tightest == 0.0:
         motion = Motion(speed, yaw_rate, safe)
         speed, yaw_rate, safe = come_back(b, n, motion, Line(left, px, py, allowed), way, near, traffic)
-    if not safe and offset == 0.0 and (passes or returns):
-        if returns:
+    if not safe and offset == 0.0 and (passes or returns or slants):
+        if returns or slants:
             allowed = min(allowed, room_to_return(b, n, way, traffic) / vehicle.period)
         speed, yaw_rate = steer(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
