@@ -10,7 +10,7 @@ import json
 import re
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
@@ -24,6 +24,10 @@ from scipy.sparse.csgraph import connected_components
 
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
+from dubins_traffic.record.sink import End
+from dubins_traffic.runs.single import run_trial
+from dubins_traffic.scoring.judging import Judging
+from dubins_traffic.scoring.verdict import Ruling
 from dubins_traffic.synthesis import answer as answering
 from dubins_traffic.synthesis.answer import answer
 from dubins_traffic.synthesis.board import Board
@@ -367,6 +371,42 @@ def test_two_hundred_files_of_four_tools_have_the_verdict_of_playing_everything(
     assert all(min(counts) > 0 for counts in wins.values())
 
 
+@pytest.mark.parametrize(
+    "form", [FORMS[0], *(pytest.param(own, marks=pytest.mark.long) for own in FORMS[1:])]
+)
+def test_every_strategy_that_loses_loses_on_the_road_to_its_counter_play(
+    form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the two hundred files those of one form, each in a trial whose e-agents drive by the play.
+
+    In some the play lets a car stay in an intersection from which the ego keeps the lane: on the road that is an E4.
+    """
+    instance = replace(foreign.instance(), duration=90.0)
+    solution = answer(instance).solution
+    stays = 0
+    for seed in range(34):
+        monkeypatch.setattr(foreign, "machine", changed(seed))
+        (tmp_path / str(seed)).mkdir()
+        path = foreign.files(tmp_path / str(seed))[form]
+        play = check_strategy(path, solution.game, instance).counter
+        if play is None:
+            continue
+        times = Judging()
+        came = run_trial(play.trial(instance), str(path), sinks=[times])
+        verdict = came.score.verdict
+        assert verdict is not None
+        assert verdict.verdict is not Ruling.SATISFIED
+        others = [one for one in verdict.violations if one.car != "ego"]
+        stays += bool(others)
+        assert [one.rule for one in others] in ([], ["E4"], ["E4", "E6"]), seed
+        if came.ending.end is not End.CONTROLLER_FAULT:
+            # The first 35 s are for what comes before the play repeats.
+            late = {goal for tick, goal in times.visits if tick > 35.0 * instance.problem.rate}
+            assert late < {0, 1}, seed
+            assert play.goal not in late, seed
+    assert stays <= 7
+
+
 def changed(seed: int) -> Callable[[], tuple[int, dict[tuple[int, int], int]]]:
     """Return the machine of `foreign` with some of its answers changed, more and more with the number."""
     first, steps = ANSWERS()
@@ -474,15 +514,33 @@ def test_the_command_tells_who_wins(
     monkeypatch.setattr(foreign, "machine", standing)
     (tmp_path / "bad").mkdir()
     bad = foreign.files(tmp_path / "bad")["hoa"]
-    assert main([*line, "--check", str(bad), "--counter-play", "play.json"]) == 1
+    shown = ["--counter-play", "play.json", "--counter-trial", "lost.json"]
+    assert main([*line, "--check", str(bad), *shown]) == 1
     out = capsys.readouterr().out
     assert "is kept from goal" in out
     assert "From here on nobody moves any more." in out
     play = json.loads(Path("play.json").read_text())
     assert play["format"] == "dubins-traffic counter-play"
     assert list(turns_of(play))[play["again"]] == list(turns_of(play))[-1]
-    assert main([*line, "--check", str(bad), "--counter-play", "play.json"]) == 2
+    assert main(["run", "lost.json", "--controller", str(bad), "--records", "lost"]) == 0
     capsys.readouterr()
+    assert main(["check", next(map(str, Path("lost").glob("*.mcap")))]) == 0
+    assert "0 rounds" in capsys.readouterr().out
+    assert main([*line, "--check", str(bad), *shown]) == 2
+    assert (
+        main(
+            [*line, "--check", str(bad), "--counter-trial", "play.json", "--counter-play", "play.json", "-F"]
+        )
+        == 2
+    )
+    assert main([*line, "--counter-trial", "other.json"]) == 2
+    assert "--counter-trial: no strategy to be checked" in capsys.readouterr().err
+    damaged = json.loads(Path("lost.json").read_text())
+    for own in damaged["e-agents"]:
+        own["parameters"]["turns"][0] = [0, 99]
+    Path("damaged.json").write_text(json.dumps(damaged))
+    assert main(["run", "damaged.json", "--controller", str(bad)]) == 2
+    assert "parameters.turns.0: no turn of this game: got [0, 99]" in capsys.readouterr().err
     assert main(["synth", "demo", "--cars", "1", "--check", str(good)]) == 2
     assert str(good) in capsys.readouterr().err
     monkeypatch.setattr(answering, "answer", None)  # a file is read before the game is solved

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
-from collections.abc import Callable, Generator
+from collections.abc import Callable, Generator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -22,7 +22,7 @@ EXAMPLES = options.examples(
     "synth first.json --assume E1,E2,E4,E5,E6 --explain",
     "synth first.json --order-degree 1 -o first.npz --json",
     "synth first.json --spec game.structuredslugs",
-    "synth first.json --check strategy.hoa --counter-play play.json",
+    "synth first.json --check strategy.hoa --counter-play play.json --counter-trial lost.json",
 )
 
 SourceArgument = Annotated[
@@ -88,6 +88,14 @@ CounterPlayOption = Annotated[
         "--counter-play", metavar="FILE", help="Write a play that it does not win, if there is one, `*.json`."
     ),
 ]
+CounterTrialOption = Annotated[
+    str | None,
+    typer.Option(
+        "--counter-trial",
+        metavar="FILE",
+        help="Write the instance in which the e-agents drive by that play, `*.json`, for `run`.",
+    ),
+]
 ExplainOption = Annotated[
     bool, typer.Option("--explain", help="Say why, and what to assume if the ego does not win.")
 ]
@@ -112,6 +120,7 @@ def synth(
     spec: SpecOption = None,
     check: CheckOption = None,
     counter_play: CounterPlayOption = None,
+    counter_trial: CounterTrialOption = None,
     overwrite: options.Replace = False,
     explain: ExplainOption = False,
     memory: MemoryOption = None,
@@ -124,6 +133,8 @@ def synth(
     Exit status: 0, or 1 if a strategy that is checked does not win. Ctrl-C ends it soon; nothing is written then.
     """
     from dubins_traffic.files import write_text
+    from dubins_traffic.problem.document import instance_to_document
+    from dubins_traffic.problem.files import write_document
     from dubins_traffic.synthesis.answer import answer
     from dubins_traffic.synthesis.exhaustive import check_strategy, read_strategy
     from dubins_traffic.synthesis.game import save_game
@@ -131,9 +142,10 @@ def synth(
     from dubins_traffic.synthesis.specification import specification_text
     from dubins_traffic.synthesis.strategy import Strategy, check_ranks
 
-    _check_outputs(source, strategy, graph, spec, counter_play, overwrite=overwrite)
-    if counter_play is not None and check is None:
-        raise InputError("no strategy to be checked", file="--counter-play", expected="--check STRATEGY")
+    _check_outputs(source, strategy, graph, spec, [counter_play, counter_trial], overwrite=overwrite)
+    for option, path in (("--counter-play", counter_play), ("--counter-trial", counter_trial)):
+        if path is not None and check is None:
+            raise InputError("no strategy to be checked", file=option, expected="--check STRATEGY")
     instance = _instance(source, seed, trial)
     held = None if check is None else read_strategy(check)
     with _progress() as progress:
@@ -158,8 +170,11 @@ def synth(
         won.first()
         check_ranks(game, won.ranks)
         won.save(strategy, overwrite=overwrite)
-    if counter_play is not None and checked is not None and checked.counter is not None:
-        write_text(counter_play, json_text.dumps(checked.counter.to_document(game), indent=1) + "\n")
+    counter = None if checked is None else checked.counter
+    if counter is not None and counter_play is not None:
+        write_text(counter_play, json_text.dumps(counter.to_document(game), indent=1) + "\n")
+    if counter is not None and counter_trial is not None:
+        write_document(instance_to_document(counter.trial(instance)), counter_trial, overwrite=overwrite)
     if json:
         extra: dict[str, object] = {"explanation": reasons} if explain else {}
         if checked is not None:
@@ -184,7 +199,7 @@ def _check_outputs(
     strategy: str | None,
     graph: str | None,
     spec: str | None,
-    counter_play: str | None,
+    counters: Sequence[str | None],
     *,
     overwrite: bool,
 ) -> None:
@@ -195,7 +210,9 @@ def _check_outputs(
     options.require(strategy, ARCHIVE, SUFFIXES, overwrite=overwrite, apart_from=[source])
     options.require(graph, ARCHIVE, SUFFIXES, overwrite=overwrite, apart_from=[source, strategy])
     options.require(spec, "a specification", tuple(FORMS), overwrite=overwrite, apart_from=[source])
-    options.require(counter_play, "a play", (".json",), overwrite=overwrite, apart_from=[source, spec])
+    for place, path in enumerate(counters):
+        others = [source, spec, *counters[:place]]
+        options.require(path, "a play", (".json",), overwrite=overwrite, apart_from=others)
 
 
 def _instance(source: str, seed: int, trial: int) -> Instance:

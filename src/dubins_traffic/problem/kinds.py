@@ -266,11 +266,21 @@ class Nudged(Strict):
 
 
 class Counter(Strict):
-    """Keeps the ego from a goal for ever where the assumption is too weak to forbid it: plays the counterstrategy."""
+    """Keeps the ego from a goal for ever: plays the counterstrategy of a weak assumption, or a counter-play."""
 
     assume: str | None = Field(
         default=None,
         description="what it keeps, as `synth --assume` takes it, such as E1,E2,E4,E5,E6; null: as the problem says",
+    )
+    turns: list[list[int]] | None = Field(
+        default=None,
+        min_length=1,
+        max_length=limits.COMMANDS,
+        description="a play that it follows instead, as `synth --counter-trial` writes: the cells of all cars, the "
+        "ego's first, at the start and after each turn of the e-agents and of the ego",
+    )
+    again: Annotated[int, Field(ge=0)] | None = Field(
+        default=None, description="from which of these on the play repeats; null: it ends"
     )
     speed: Speed = Field(default=0.7, description="speed, m/s")
 

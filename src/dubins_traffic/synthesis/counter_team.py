@@ -25,11 +25,13 @@ from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.synthesis.assumption import Assumption, Order
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.counter import Counterstrategy, Moment, followed, moment_of, story_of
+from dubins_traffic.synthesis.followed_play import FollowedPlay
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import assumption_of, cells_of
 from dubins_traffic.synthesis.queues import Scene
 from dubins_traffic.synthesis.road_play import RoadPlay, Sight, Sighting
 from dubins_traffic.synthesis.solver import solve
+from dubins_traffic.synthesis.specification import EGO
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -50,8 +52,8 @@ COUNTERSTRATEGY: Final = "counterstrategy"
 class CounterTeam:
     """Drives all e-agents of a trial, which are of kind `counter` (a `protocols.Driver`).
 
-    They hold places and make way as the counterstrategy says. They keep those rules that the problem assumes of them.
-    If the ego wins the game, they drive at random.
+    They hold places and make way as the counterstrategy says, or as a counter-play that their parameters tell. They
+    keep those rules that the problem assumes of them. If the ego wins the game, they drive at random.
     """
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:
@@ -78,7 +80,12 @@ class CounterTeam:
         self._period = problem.period
         board = Board(cells_of(problem), _assumed(instance), len(instance.e_agents))
         self._board = board
-        self._strategy = Counterstrategy(solve(build(board)))
+        self._followed = _followed(instance)
+        self._strategy = None
+        if self._followed is None:
+            self._strategy = Counterstrategy(solve(build(board)))
+        else:
+            self._followed.check_fit(board)
         sight = Sight(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
         self._play = RoadPlay(board, sight, instance.names)
         self._targets = [-1] * len(instance.starts)
@@ -86,7 +93,8 @@ class CounterTeam:
         self._jumps = board.assumption.order is not Order.KEPT
         self._times = [round(own * problem.rate) for own in _times(board, rules)]
         self._since: dict[int, int] = {}
-        self._reports = [(COUNTERSTRATEGY, f"assumed: {board.assumption}")]
+        told = f"assumed: {board.assumption}" if self._followed is None else "a counter-play is followed"
+        self._reports = [(COUNTERSTRATEGY, told)]
         self._is_told = False
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
@@ -115,25 +123,41 @@ class CounterTeam:
 
     def _choose(self, tick: int, cars: Sequence[Sighting]) -> None:
         """Choose the cells to which the cars go in this turn, and set the law's tables accordingly."""
-        play, position = self._play, self._play.position
-        self._targets = [-1] * len(play.cells)
-        if position is None or not any(loss.lost[position] for loss in self._strategy.solution.losses):
-            return
-        if not self._is_told:
-            self._is_told = True
-            self._reports += [(COUNTERSTRATEGY, line.strip()) for line in story_of(self._strategy, position)]
-        after, _ = self._strategy.choose(position, self._most_urgent(tick, position))
-        if after == self._strategy.solution.game.positions:
+        self._targets = [-1] * len(self._play.cells)
+        position = self._play.position
+        after = None if position is None else self._turn(tick, position)
+        if after is None:
             return
         self._scenes = self._board.scenes(after)
-        before = Moment(tuple(play.cells), {})
-        self._targets = list(followed(self._board, before, moment_of(self._board, after)).cells)
         for car in cars[1:]:
             self._send(car)
 
-    def _most_urgent(self, tick: int, position: int) -> int:
-        """Return the debt of a position that is due first, by the tick since which it is owed and the time allowed."""
-        owed = self._strategy.debts(position)
+    def _turn(self, tick: int, position: int) -> int | None:
+        """Set the cells to which the cars go from a position; return the position after that, None if there is none."""
+        board, cells = self._board, tuple(self._play.cells)
+        if self._followed is not None:
+            self._targets = list(self._followed.wanted(cells))
+            turn = (cells[EGO], *self._targets[1:])
+            same = (
+                after
+                for after in self._play.moves.of_others(position)
+                if after < board.positions and sorted(moment_of(board, after).cells) == sorted(turn)
+            )
+            return next(same, position)
+        strategy = self._strategy
+        if strategy is None or not any(loss.lost[position] for loss in strategy.solution.losses):
+            return None
+        if not self._is_told:
+            self._is_told = True
+            self._reports += [(COUNTERSTRATEGY, line.strip()) for line in story_of(strategy, position)]
+        after, _ = strategy.choose(position, self._most_urgent(tick, strategy.debts(position)))
+        if after == strategy.solution.game.positions:
+            return None
+        self._targets = list(followed(board, Moment(cells, {}), moment_of(board, after)).cells)
+        return after
+
+    def _most_urgent(self, tick: int, owed: Sequence[int]) -> int:
+        """Return which of what is owed is due first, by the tick since which it is owed and the time allowed."""
         self._since = {debt: self._since.get(debt, tick) for debt in owed}
         return min(owed, key=lambda debt: (self._since[debt] + self._times[debt], debt), default=0)
 
@@ -214,6 +238,18 @@ def _assumed(instance: Instance) -> Assumption:
     if not assumed.yields:
         raise InputError("they ram nobody", field="assume", value=str(assumed), expected="E2 among them")
     return assumed
+
+
+def _followed(instance: Instance) -> FollowedPlay | None:
+    """Return the play that the cars' parameters tell, None if they tell none."""
+    told = [(agent.parameters["turns"], agent.parameters["again"]) for agent in instance.e_agents]
+    if told.count(told[0]) < len(told):
+        raise InputError(
+            "the e-agents of one team must follow the same play", field="turns",
+            expected="equal values for all e-agents of the kind counter",
+        )  # fmt: skip
+    turns, again = told[0]
+    return None if turns is None else FollowedPlay(turns, again)
 
 
 def _sighting(n: int, state: State, labels: Labels) -> Sighting:

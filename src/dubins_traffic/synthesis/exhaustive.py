@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Hashable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, Protocol, TypeAlias
 
@@ -19,6 +19,7 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.kinds import COUNTER, parameters_of
 from dubins_traffic.synthesis.archive import SUFFIXES
 from dubins_traffic.synthesis.foreign.machine import Machine
 from dubins_traffic.synthesis.foreign.player import (
@@ -125,6 +126,15 @@ class CounterPlay:
             "goal": None if self.goal is None else road_cells.target_name(self.goal),
             "end": self.end,
         }
+
+    def trial(self, instance: Instance) -> Instance:
+        """Return an instance in which the e-agents drive by this play: all of them are of the kind `counter`."""
+        own: dict[str, Any] = {"turns": [list(cells) for cells in self.turns], "again": self.again}
+        parameters = parameters_of(COUNTER, own)
+        agents = (
+            replace(agent, kind=COUNTER, type=COUNTER, parameters=parameters) for agent in instance.e_agents
+        )
+        return replace(instance, e_agents=tuple(agents))
 
     def lines(self, game: Game) -> list[str]:
         """Return the play for people."""

@@ -39,7 +39,7 @@ def take_another(b: int, n: int, tick: int, budget: float, traffic: Traffic) -> 
     net = drivers.net[b]
     car = drivers.car[b, n]
     v = lane_end(roads, net, car.lane)
-    row = roads.vert_off[net] + v
+    row = int(roads.vert_off[net]) + v
     price_exits(b, n, tick, traffic)
     if is_late(car, drivers.vehicle[b]):
         prefer_near(b, n, row, drivers.vehicle[b], traffic)
@@ -117,7 +117,7 @@ def take_last_resort(b: int, n: int, traffic: Traffic) -> bool:
     net = drivers.net[b]
     car = drivers.car[b, n]
     v = lane_end(roads, net, car.lane)
-    row = roads.vert_off[net] + v
+    row = int(roads.vert_off[net]) + v
     ample = barred = opened = 0
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
