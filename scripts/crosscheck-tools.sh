@@ -42,6 +42,9 @@ mkdir -p "$folder"
   environment lanelet2 lanelet2.io 'lanelet2==1.2.3'
 } &
 environment rtamt rtamt 'rtamt==0.4.10' setuptools
+# Its optimizers alone, which run in .venv: what else it needs is there.
+environment psytaliro ppft --no-deps 'psy-taliro==3.2.0' 'pybanquo==0.1.1' 'pathos==0.3.5' 'ppft==1.7.8' 'dill==0.4.1' \
+  'attrs>=24.1' 'sortedcontainers~=2.4'
 environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
 environment omega dd.cudd,omega.games.gr1 'omega==0.4.0' 'dd==0.6.0' setuptools
 environment jazzy rclpy 'ros-rclpy~=7.1.6' 'ros-rmw-fastrtps-cpp~=8.4' 'ros-nav-msgs~=5.3'

@@ -50,13 +50,14 @@ def first_found(name: str, strategy: str, seed: int, trials: int) -> tuple[int, 
             found.append(own)
             raise _FoundError
 
-    with tempfile.TemporaryDirectory() as folder, patch.multiple(search, SMALL=least, GENERATION=most):
+    with tempfile.TemporaryDirectory() as folder, patch.object(search, "SMALL", least):
         try:
             falsify(
                 Configuration.from_document(TOWN),
                 MUTANTS[name].kind,
                 Path(folder) / "found",
                 trials=trials,
+                most=most,
                 seed=seed,
                 strategy=strategy,
                 progress=look,

@@ -53,7 +53,14 @@ TrialsOption = Annotated[
 SecondsOption = Annotated[
     float | None, typer.Option("--seconds", metavar="S", min=0, help="End after so many seconds.")
 ]
-StrategyOption = Annotated[str, typer.Option("--strategy", metavar="NAME", help="evolution, uniform or cma.")]
+StrategyOption = Annotated[
+    str,
+    typer.Option(
+        "--strategy", metavar="NAME",
+        help="evolution, uniform or cma; or a class of your own, module:Class or path/to/file.py:Class, which runs in "
+        "this process and is trusted.",
+    ),
+]  # fmt: skip
 DurationOption = Annotated[
     float, typer.Option("--duration", metavar="S", help="Seconds of a trial; 0: as the configuration says.")
 ]

@@ -84,9 +84,9 @@ class Source:
     """
 
     def __init__(self, configuration: Configuration, seed: int, *, frees: bool = True) -> None:
-        self._configuration, self._seed, self._frees = configuration, seed, frees
+        self._configuration, self.seed, self._frees = configuration, seed, frees
         self._words = [STREAM, seed & WORD, seed >> 32] if seed > WORD else [STREAM, seed]
-        self._movable = moves.movable(configuration)
+        self.movable = moves.movable(configuration)
         self._known: dict[int, Instance] = {}
         self._freed: tuple[tuple[EAgent, ...], tuple[EAgent, ...]] = (), ()
         """The e-agents of the last instance that was drawn, and what became of them."""
@@ -100,7 +100,7 @@ class Source:
         """Return the instances of the configuration with some numbers."""
         missing = sorted({number for number in numbers if number not in self._known})
         if missing:
-            for instance in draw_many(self._configuration, self._seed, missing):
+            for instance in draw_many(self._configuration, self.seed, missing):
                 self._known[instance.trial] = self._free(instance)
         return [self._known[number] for number in numbers]
 
@@ -142,14 +142,14 @@ class Source:
         other = mate, self._base(mate.base)
         for _ in range(int(dice.geometric(ONE))):
             base = self._base(genome.base)
-            genome = moves.changed(genome, base, other, self._movable, dice)
+            genome = moves.changed(genome, base, other, self.movable, dice)
         return genome
 
     def arranged(self, number: int, dice: np.random.Generator) -> Genome:
         """Return the genome that `fresh` draws, with some of the cars brought to where they meet the ego soon."""
         genome = self.fresh(number)
-        for _ in range(1 + int(dice.integers(len(self._movable) + 1))):
-            genome = moves.joined(genome, self._base(number), self._movable, dice)
+        for _ in range(1 + int(dice.integers(len(self.movable) + 1))):
+            genome = moves.joined(genome, self._base(number), self.movable, dice)
         return genome
 
     def build(self, genomes: Sequence[Genome]) -> list[Instance]:

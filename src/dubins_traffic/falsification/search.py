@@ -200,12 +200,16 @@ class Search:
             self._restore(state)
         self.finished = self.counts.trials
 
-    def generation(self, most: int) -> None:
-        """Try the next trials, at most `most`; whatever interrupts it, they are taken over whole or not at all."""
+    def generation(self, most: int) -> bool:
+        """Try the next trials, at most `most`; whatever interrupts it, they are taken over whole or not at all.
+
+        It returns whether there were any: False where the strategy proposes nothing any more.
+        """
         first = self.counts.trials
         size = min(self.most, max(SMALL, first // SHARE // SMALL * SMALL))
         numbers = range(first, first + min(size, most))
         genomes = self._strategy.propose(numbers)
+        numbers = numbers[: len(genomes)]
         instances = self._source.build(genomes)
         tried = self._tried(numbers, genomes, instances)
         fresh, unconfirmed = self._judged(numbers, instances, tried)
@@ -217,6 +221,7 @@ class Search:
                 self.found_in[cell] = number
             self.archive.journal.taken()
         self._tell()
+        return bool(genomes)
 
     def _tell(self) -> None:
         if self._progress is not None:
@@ -387,7 +392,8 @@ def falsify(
     seed : int
         What all follows from: the same seed and number of trials give the same files, byte for byte.
     strategy : str
-        ``evolution``, ``uniform``, or ``cma``, which needs the extra `falsify`.
+        ``evolution``, ``uniform``, or ``cma``, which needs the extra `falsify`; or a class of one's own
+        (`plugged.Sampler`), ``module:Class`` or ``path/to/file.py:Class``.
     duration : float or None
         Seconds of a trial; None: as the configuration says.
     workers : int
@@ -449,7 +455,8 @@ def _run(search: Search, trials: int | None, seconds: float | None) -> None:
     while (trials is None or search.counts.trials < trials) and (
         seconds is None or time.monotonic() - began < seconds
     ):
-        search.generation(search.most if trials is None else trials - search.counts.trials)
+        if not search.generation(search.most if trials is None else trials - search.counts.trials):
+            return
         if time.monotonic() - saved > SAVE:
             search.save()
             saved = time.monotonic()

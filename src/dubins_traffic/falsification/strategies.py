@@ -1,19 +1,21 @@
-"""How a search proposes what to try next: at random, by evolution, or by CMA-ES (optional extra ``falsify``)."""
+"""How a search proposes what to try next: at random, by evolution, by CMA-ES (extra ``falsify``), or as a user says."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final, Protocol
 
 import numpy as np
 
-from dubins_traffic.agents.choices import BOUNDS, CHOICE
 from dubins_traffic.errors import InputError, needs
+from dubins_traffic.falsification.cube import Cube
 from dubins_traffic.falsification.moves import Genome
+from dubins_traffic.falsification.plugged import Plugged
 from dubins_traffic.falsification.sampling import Source, Stream
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.outside import is_place
 
 if TYPE_CHECKING:
     import numpy as np
@@ -282,24 +284,20 @@ class _Climb:
     """One run of CMA-ES, on the tables of the cars of the drawn trial `base`."""
 
     def __init__(self, cma: Any, source: Source, base: int) -> None:
-        self.base = base
-        drawn = source.fresh(base)
-        self._whims = drawn.whims
-        self._shapes = {car: table.shape for car, table in drawn.tables.items()}
-        size = max(2, sum(rows * columns for rows, columns in self._shapes.values()))
+        self.base, self._cube = base, Cube(source, base)
         dice = source.dice(base, Stream.CHOICES)
 
         def normal(*shape: int) -> Floats:
             return dice.standard_normal(shape)
 
         options = {"bounds": [0.0, 1.0], "verbose": -9, "seed": np.nan, "randn": normal}
-        self._strategy = cma.CMAEvolutionStrategy(size * [0.5], STEP, options)
+        self._strategy = cma.CMAEvolutionStrategy(max(2, self._cube.size) * [0.5], STEP, options)
         self._asked: list[Floats] = []
 
     def ask(self, count: int) -> list[Genome]:
         """Return proposals."""
         self._asked = self._strategy.ask(count)
-        return [self._genome(np.asarray(point)) for point in self._asked]
+        return [self._cube.genome(np.asarray(point)) for point in self._asked]
 
     def tell(self, values: Sequence[float | None]) -> bool:
         """Move to where the values are least; tell whether it is over."""
@@ -308,18 +306,6 @@ class _Climb:
             return min(known) < 0.0
         self._strategy.tell(self._asked, known)
         return bool(self._strategy.stop())
-
-    def _genome(self, point: Floats) -> Genome:
-        low, high = BOUNDS[:, 0], BOUNDS[:, 1]
-        tables: dict[int, Floats] = {}
-        done = 0
-        for car, (rows, columns) in self._shapes.items():
-            share = point[done : done + rows * columns].reshape(rows, columns)
-            done += rows * columns
-            tables[car] = low + (high - low) * share
-            exits = np.minimum(np.floor(share[:, CHOICE.EXIT] * (high[CHOICE.EXIT] + 1)), high[CHOICE.EXIT])
-            tables[car][:, CHOICE.EXIT] = exits
-        return Genome(self.base, self.base, {}, tables, self._whims)
 
 
 class Strategy(Protocol):
@@ -365,7 +351,7 @@ class Uniform:
         """Nothing is to be restored."""
 
 
-STRATEGIES: Final[Mapping[str, type[Uniform | Evolution | Cma]]] = {
+STRATEGIES: Final[Mapping[str, Callable[[Source, Sequence[str]], Strategy]]] = {
     "uniform": Uniform,
     "evolution": Evolution,
     "cma": Cma,
@@ -373,8 +359,10 @@ STRATEGIES: Final[Mapping[str, type[Uniform | Evolution | Cma]]] = {
 
 
 def make(name: str, source: Source, targets: Sequence[str]) -> Strategy:
-    """Return the strategy that a name stands for."""
+    """Return the strategy that a name stands for, or the class of a user's own at a place."""
+    if is_place(name):
+        return Plugged(name, source, targets)
     if name not in STRATEGIES:
-        expected = f"one of {', '.join(STRATEGIES)}"
+        expected = f"one of {', '.join(STRATEGIES)}, module:Class or path/to/file.py:Class"
         raise InputError("no such strategy", file="--strategy", value=name, expected=expected)
     return STRATEGIES[name](source, targets)
