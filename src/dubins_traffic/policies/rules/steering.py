@@ -28,6 +28,10 @@ ALIGNED, NIMBLE = 0.8, 0.98
 """Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
 CREEPS, SLIDES = 0.05, 0.2
 """A car that has to return and may not drive faster than the first goes straight to the right at the second, m/s."""
+CLOSE = 0.002
+"""Least distance from the disc ahead at which it does so right of the centre line, metres."""
+EXACT = 0.9999
+"""Cosine of the angle to that direction within which it drives."""
 SQUARE = 0.999
 """Sine of the angle at which it does."""
 SLIGHT = 0.1
@@ -92,7 +96,7 @@ def move(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
         )
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
-    elif not safe and (passes or steep == ABRUPT):
+    elif not safe and (passes or steep == ABRUPT or offset < 0.0):
         across, narrow = 1.0 if left > offset else -1.0, within_lane(drivers.car[b, n].aside, vehicle)
         speed, yaw_rate = steer(
             c, s, across, px, py, bend, allowed, NIMBLE if narrow else SQUARE, aligned, limit, vehicle.tightest,
@@ -144,15 +148,28 @@ def come_back(
     if safe and motion.speed == 0.0 and line.speed >= CREEPS:
         pose = Pose(x, y, *heading(line, STEEP))
         safe = is_safe_from(pose, b, Command(line.speed, 0.0), near, -1, traffic, vehicle)
-    if not (safe and line.speed >= CREEPS) and along(way, x, y) < last_return(vehicle) + NARROWLY:
-        pose = Pose(x, y, *heading(line, SQUARE))
+    own = along(way, x, y)
+    if not (safe and line.speed >= CREEPS) and may_slide(own, line.left, vehicle):
+        # Near the disc straight to the right to the end: at a slant it would come into the disc, still left.
+        left = line.left if own < last_return(vehicle) + NARROWLY else 1.0
+        pose = Pose(x, y, *heading(Line(left, line.px, line.py, SLIDES), SQUARE))
         if is_safe_from(pose, b, Command(SLIDES, 0.0), near, -1, traffic, vehicle):
             speed, yaw_rate = steer(
-                state.c[b, n], state.s[b, n], line.left, line.px, line.py, 0.0, SLIDES, SQUARE, NIMBLE,
+                state.c[b, n], state.s[b, n], left, line.px, line.py, 0.0, SLIDES, SQUARE, EXACT,
                 vehicle.yaw_most, 0.0, vehicle.period,
             )  # fmt: skip
             return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
     return Motion(motion.speed, motion.yaw_rate, safe)
+
+
+@jit_inline
+def may_slide(own: float, left: float, vehicle: Vehicle) -> bool:
+    """Tell whether a car `left` (m) of its lane's middle can go straight to the right without meeting the disc ahead.
+
+    It is at `own` (m) along the lane. Right of the centre line that brings it away from the disc.
+    """
+    beside, room = max(vehicle.middle - left, 0.0), vehicle.disc + vehicle.reach + CLOSE
+    return own < last_return(vehicle) + NARROWLY or own * own + beside * beside > room * room
 
 
 @jit_inline
