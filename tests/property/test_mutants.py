@@ -21,7 +21,7 @@ CASES = {
     "clear_early": (2, 9.0),
     "left_long": (16, 16.0),
     "swerves": (130, 14.0),
-    "returns_early": (16, 20.0),
+    "returns_early": (16, 24.0),
     "forgets_standing": (5, 20.0),
 }
 """For each mutant the number of a case in which it breaks its clause, and seconds after which it has."""
