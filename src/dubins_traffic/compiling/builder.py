@@ -21,6 +21,7 @@ from time import monotonic, process_time, sleep
 from typing import TYPE_CHECKING
 
 from dubins_traffic.compiling import beside, store
+from dubins_traffic.errors import shown
 from dubins_traffic.kernels.sources import key_of, symbol
 
 if TYPE_CHECKING:
@@ -135,7 +136,7 @@ def _compile(compiler: Compiler, wish: beside.Wish) -> None:
         store.save(wish.path, answer, code)
     except Exception as error:
         # Numba's messages end with a line of source: the last line of what is told says what is wrong.
-        told = f"{traceback.format_exc()}{type(error).__name__}: {' '.join(str(error).split())[:300]}"
+        told = f"{traceback.format_exc()}{shown(f'{type(error).__name__}: {error}', 300)}"
         with contextlib.suppress(OSError):
             store.write_whole(wish.failure, told.encode())
 

@@ -6,6 +6,7 @@ minute, ends the search with a message that names it, and what has been found is
 
 from __future__ import annotations
 
+import hashlib
 import math
 import queue
 import threading
@@ -129,7 +130,7 @@ class Plugged:
         if tried.discarded or tried.faulty:
             margin = None
         else:
-            margin = min((tried.margins.get(own, math.inf) for own in self._space.targets), default=math.inf)
+            margin = min(tried.margins.get(own, math.inf) for own in self._space.targets)
         self._hear(margin)
 
     def _hear(self, margin: float | None) -> None:
@@ -142,7 +143,10 @@ class Plugged:
 
     def state(self) -> Any:
         """Return the margins of all trials, from which `restore` goes the same way again."""
-        return {"margins": [_written(trial.margin) for trial in self._history], "sum": _sum(self._history)}
+        return {
+            "margins": [_written(trial.margin) for trial in self._history],
+            "points": _digest(self._history),
+        }
 
     def restore(self, state: Any) -> None:
         """Go the way again that led to a state; InputError if the sampler proposes something else this time."""
@@ -154,7 +158,7 @@ class Plugged:
             for margin in margins[:count]:
                 self._hear(math.inf if margin == "inf" else margin)
             del margins[:count]
-        if margins or _sum(self._history) != state["sum"]:
+        if margins or _digest(self._history) != state["points"]:
             raise self._refused(
                 "does not propose again what it did",
                 self._spec,
@@ -194,6 +198,6 @@ def _written(margin: float | None) -> float | str | None:
     return "inf" if margin == math.inf else margin
 
 
-def _sum(history: Sequence[Trial]) -> float:
-    """Return a number that tells the points of trials from others."""
-    return float(sum(math.fsum(trial.point) * (1 + k % 97) for k, trial in enumerate(history)))
+def _digest(history: Sequence[Trial]) -> str:
+    """Return what tells the points of trials from others."""
+    return hashlib.sha256(np.array([trial.point for trial in history]).tobytes()).hexdigest()

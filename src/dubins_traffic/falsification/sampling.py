@@ -81,6 +81,13 @@ class Source:
         What all follows from.
     frees : bool
         Whether e-agents of the kind `lawful` that break nothing are to choose (`CHOSEN`).
+
+    Attributes
+    ----------
+    seed : int
+        As given.
+    movable : tuple of int
+        The numbers of the cars whose starts the configuration leaves to chance; 0 is the ego.
     """
 
     def __init__(self, configuration: Configuration, seed: int, *, frees: bool = True) -> None:

@@ -80,12 +80,7 @@ class CounterTeam:
         self._period = problem.period
         board = Board(cells_of(problem), _assumed(instance), len(instance.e_agents))
         self._board = board
-        self._followed = _followed(instance)
-        self._strategy = None
-        if self._followed is None:
-            self._strategy = Counterstrategy(solve(build(board)))
-        else:
-            self._followed.check_fit(board)
+        self._guide = _followed(instance, board) or Counterstrategy(solve(build(board)))
         sight = Sight(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
         self._play = RoadPlay(board, sight, instance.names)
         self._targets = [-1] * len(instance.starts)
@@ -93,7 +88,8 @@ class CounterTeam:
         self._jumps = board.assumption.order is not Order.KEPT
         self._times = [round(own * problem.rate) for own in _times(board, rules)]
         self._since: dict[int, int] = {}
-        told = f"assumed: {board.assumption}" if self._followed is None else "a counter-play is followed"
+        follows = isinstance(self._guide, FollowedPlay)
+        told = "a counter-play is followed" if follows else f"assumed: {board.assumption}"
         self._reports = [(COUNTERSTRATEGY, told)]
         self._is_told = False
 
@@ -134,9 +130,9 @@ class CounterTeam:
 
     def _turn(self, tick: int, position: int) -> int | None:
         """Set the cells to which the cars go from a position; return the position after that, None if there is none."""
-        board, cells = self._board, tuple(self._play.cells)
-        if self._followed is not None:
-            self._targets = list(self._followed.wanted(cells))
+        board, cells, guide = self._board, tuple(self._play.cells), self._guide
+        if isinstance(guide, FollowedPlay):
+            self._targets = list(guide.wanted(cells))
             turn = (cells[EGO], *self._targets[1:])
             same = (
                 after
@@ -144,14 +140,13 @@ class CounterTeam:
                 if after < board.positions and sorted(moment_of(board, after).cells) == sorted(turn)
             )
             return next(same, position)
-        strategy = self._strategy
-        if strategy is None or not any(loss.lost[position] for loss in strategy.solution.losses):
+        if not any(loss.lost[position] for loss in guide.solution.losses):
             return None
         if not self._is_told:
             self._is_told = True
-            self._reports += [(COUNTERSTRATEGY, line.strip()) for line in story_of(strategy, position)]
-        after, _ = strategy.choose(position, self._most_urgent(tick, strategy.debts(position)))
-        if after == strategy.solution.game.positions:
+            self._reports += [(COUNTERSTRATEGY, line.strip()) for line in story_of(guide, position)]
+        after, _ = guide.choose(position, self._most_urgent(tick, guide.debts(position)))
+        if after == guide.solution.game.positions:
             return None
         self._targets = list(followed(board, Moment(cells, {}), moment_of(board, after)).cells)
         return after
@@ -225,31 +220,32 @@ def _times(board: Board, rules: RuleParameters) -> list[float]:
 
 def _assumed(instance: Instance) -> Assumption:
     """Return which rules the team keeps: as its cars' parameters say, or as the problem assumes."""
-    words = {agent.parameters["assume"] for agent in instance.e_agents}
-    if len(words) > 1:
-        raise InputError(
-            "the e-agents of one team must make the same assumption",
-            field="assume",
-            value=sorted(map(str, words)),
-            expected="equal values for all e-agents of the kind counter",
-        )
-    (own,) = words
+    own = _common(instance, "assume", "make the same assumption")
     assumed = assumption_of(instance.problem) if own is None else Assumption.parse(own.split(","))
     if not assumed.yields:
         raise InputError("they ram nobody", field="assume", value=str(assumed), expected="E2 among them")
     return assumed
 
 
-def _followed(instance: Instance) -> FollowedPlay | None:
+def _followed(instance: Instance, board: Board) -> FollowedPlay | None:
     """Return the play that the cars' parameters tell, None if they tell none."""
-    told = [(agent.parameters["turns"], agent.parameters["again"]) for agent in instance.e_agents]
-    if told.count(told[0]) < len(told):
+    turns, again = (_common(instance, name, "follow the same play") for name in ("turns", "again"))
+    if turns is None:
+        return None
+    play = FollowedPlay(turns, again)
+    play.check_fit(board)
+    return play
+
+
+def _common(instance: Instance, name: str, must: str) -> Any:
+    """Return the parameter that all cars of a team have alike; InputError, which says what they `must` do, if not."""
+    own, *others = (agent.parameters[name] for agent in instance.e_agents)
+    if any(other != own for other in others):
         raise InputError(
-            "the e-agents of one team must follow the same play", field="turns",
-            expected="equal values for all e-agents of the kind counter",
+            f"the e-agents of one team must {must}", field=name,
+            value=sorted({str(own), *map(str, others)}), expected="equal values for all e-agents of the kind counter",
         )  # fmt: skip
-    turns, again = told[0]
-    return None if turns is None else FollowedPlay(turns, again)
+    return own
 
 
 def _sighting(n: int, state: State, labels: Labels) -> Sighting:

@@ -48,14 +48,11 @@ class FollowedPlay:
         if cells[EGO] not in (self.turns[self._at][EGO], self._answered(self._at)[EGO]):
             self._at = self._resumed(cells)
         for _ in self.turns:
-            if tuple(cells) != tuple(self._answered(self._at)) or self._next(self._at) is None:
+            after = self._next(self._at)
+            if after is None or tuple(cells) != tuple(self._answered(self._at)):
                 break
-            self._at = self._next(self._at) or 0
-        return self._made(self._at)
-
-    def _made(self, at: int) -> Sequence[int]:
-        """Return the cells after the environment's turn at a place."""
-        return self.turns[min(at + 1, len(self.turns) - 1)]
+            self._at = after
+        return self.turns[min(self._at + 1, len(self.turns) - 1)]
 
     def _answered(self, at: int) -> Sequence[int]:
         """Return the cells after the ego's answer to that."""

@@ -75,9 +75,8 @@ def prefer_near(b: int, n: int, row: int, vehicle: Vehicle, traffic: Traffic) ->
     """
     state, roads, drivers, scratch = traffic.state, traffic.roads, traffic.drivers, traffic.scratch
     for k in range(roads.degree[row]):
-        along, left = lane_coordinates(
-            roads, drivers.net[b], int(roads.arms[row, k]), state.x[b, n], state.y[b, n]
-        )
+        out = int(roads.arms[row, k])
+        along, left = lane_coordinates(roads, drivers.net[b], out, state.x[b, n], state.y[b, n])
         along, left = along - vehicle.disc, left + vehicle.middle
         scratch.cost[k] += HASTE * sqrt(along * along + left * left)
 

@@ -149,9 +149,10 @@ def come_back(
         pose = Pose(x, y, *heading(line, STEEP))
         safe = is_safe_from(pose, b, Command(line.speed, 0.0), near, -1, traffic, vehicle)
     own = along(way, x, y)
-    if not (safe and line.speed >= CREEPS) and may_slide(own, line.left, vehicle):
+    far = own < last_return(vehicle) + NARROWLY
+    if not (safe and line.speed >= CREEPS) and (far or keeps_off(own, line.left, vehicle)):
         # Near the disc straight to the right to the end: at a slant it would come into the disc, still left.
-        left = line.left if own < last_return(vehicle) + NARROWLY else 1.0
+        left = line.left if far else 1.0
         pose = Pose(x, y, *heading(Line(left, line.px, line.py, SLIDES), SQUARE))
         if is_safe_from(pose, b, Command(SLIDES, 0.0), near, -1, traffic, vehicle):
             speed, yaw_rate = steer(
@@ -163,13 +164,13 @@ def come_back(
 
 
 @jit_inline
-def may_slide(own: float, left: float, vehicle: Vehicle) -> bool:
-    """Tell whether a car `left` (m) of its lane's middle can go straight to the right without meeting the disc ahead.
+def keeps_off(own: float, left: float, vehicle: Vehicle) -> bool:
+    """Tell whether a car `left` (m) of its lane's middle keeps off the disc ahead as it goes straight to the right.
 
     It is at `own` (m) along the lane. Right of the centre line that brings it away from the disc.
     """
     beside, room = max(vehicle.middle - left, 0.0), vehicle.disc + vehicle.reach + CLOSE
-    return own < last_return(vehicle) + NARROWLY or own * own + beside * beside > room * room
+    return own * own + beside * beside > room * room
 
 
 @jit_inline
