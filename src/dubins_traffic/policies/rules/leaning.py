@@ -1,4 +1,4 @@
-"""Driving farther right past a body beside the lane, where a tick is long (compiled).
+"""Driving farther right past a body beside the lane, where a tick is long, or left past an ego in a disc (compiled).
 
 `policies.safety` keeps what another may reach in a tick. At low control rates that is more than lies between a car in
 the middle of its lane and one that stands at the centre line, yet the lane is free (docs/rules.md#free-exit).
@@ -9,7 +9,14 @@ from __future__ import annotations
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
-from dubins_traffic.policies.rules.seeing import is_by_disc_behind, kept_beside, leans, leans_from, way_to_go
+from dubins_traffic.policies.rules.seeing import (
+    farthest_left,
+    is_by_disc_behind,
+    kept_beside,
+    leans,
+    leans_from,
+    way_to_go,
+)
 from dubins_traffic.policies.rules.tables import Traffic
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_lane, on_way
 from dubins_traffic.roads.lookup import lane_end, lane_start
@@ -22,7 +29,7 @@ is beside it, and has room to turn straight again."""
 
 @jit_inline
 def lean(b: int, n: int, offset: float, part: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
-    """Return how far left of its way car n drives past the bodies left of it, 0 or less, metres; 0 while it passes.
+    """Return how far left of its way car n drives past the bodies beside it, metres; 0 while it passes.
 
     `offset` (m) is where it would drive otherwise, `part` of the way; `near` (count) cars are listed.
     """
@@ -68,10 +75,11 @@ def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
 
 @jit_rare
 def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic: Traffic) -> float:
-    """Return how far left of its way a car keeps clear of the listed bodies beside its lane, 0 or less, metres.
+    """Return how far left of its way a car keeps clear of the listed bodies beside its lane, metres.
 
     Those have their centres left of the centre line; who is ahead or behind in the lane is not passed by leaning. Its
-    centre stays on the road. `near` (count) cars are listed.
+    centre stays on the road. Only an ego that is in a disc as well, right of the way, is passed on its left. `near`
+    (count) cars are listed.
     """
     state, scratch, vehicle = traffic.state, traffic.scratch, traffic.drivers.vehicle[b]
     clear, far = kept_beside(vehicle), leans_from(vehicle)
@@ -93,4 +101,6 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
             if leans(vehicle):
                 edge = min(edge, vehicle.middle - vehicle.over)
             offset = min(offset, edge - clear)
+        elif j == EGO and left < 0.0 and part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:
+            offset = left + half + clear if left + half + clear <= farthest_left(vehicle) else offset
     return max(offset, EDGE - vehicle.middle)

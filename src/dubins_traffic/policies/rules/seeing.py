@@ -212,12 +212,18 @@ def leans_past(b: int, left: float, px: float, py: float, car: Driver, traffic: 
     The way has the direction (`px`, `py`) there.
     """
     vehicle = traffic.drivers.vehicle[b]
-    if left <= vehicle.middle or car.aside != 0.0 or traffic.labels.lane[b, EGO] >= 0:
+    if car.aside != 0.0 or traffic.labels.lane[b, EGO] >= 0:
         return False
-    return (
-        left - half_across(b, EGO, px, py, traffic.state, vehicle) - kept_beside(vehicle)
-        >= EDGE - vehicle.middle
-    )
+    kept = half_across(b, EGO, px, py, traffic.state, vehicle) + kept_beside(vehicle)
+    if left < 0.0:
+        return left + kept <= farthest_left(vehicle)
+    return left > vehicle.middle and left - kept >= EDGE - vehicle.middle
+
+
+@jit_inline
+def farthest_left(vehicle: Vehicle) -> float:
+    """Return how far left of its lane's middle a car drives at most, metres: its body hardly comes over the line."""
+    return vehicle.middle - vehicle.half_width - vehicle.rounding + vehicle.over
 
 
 @jit_inline
