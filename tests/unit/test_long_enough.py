@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
+from dubins_traffic.cli.long_enough import is_too_short, least_duration, short_notice
 from dubins_traffic.cli.main import main
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.routing.rounds import round_time
-from dubins_traffic.scoring.long_enough import is_too_short, least_duration, short_notice
 from dubins_traffic.suites.suite import load_suite, shipped_suites
 
 

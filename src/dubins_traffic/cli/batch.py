@@ -70,11 +70,11 @@ def batch(
 
     Ctrl-C keeps the scores of all finished trials.
     """
+    from dubins_traffic.cli.long_enough import LOOKED_AT, short_notice
     from dubins_traffic.controllers.registry import dressed
     from dubins_traffic.engine.batch import run_batch
     from dubins_traffic.problem.configuration import load_config
     from dubins_traffic.problem.draw import draw
-    from dubins_traffic.scoring.long_enough import LOOKED_AT, short_notice
 
     drawn = load_config(configuration)
     maps.report(drawn.network)

@@ -77,8 +77,8 @@ def run(
     from dubins_traffic.campaign.campaign import load_campaign
     from dubins_traffic.campaign.folder import kept
     from dubins_traffic.campaign.run_campaign import run_campaign
+    from dubins_traffic.cli.long_enough import short_notice
     from dubins_traffic.cli.progress import progress
-    from dubins_traffic.scoring.long_enough import short_notice
 
     total = 0
     planned = load_campaign(file, sandbox=options.boxes(sandbox, limits, trust))

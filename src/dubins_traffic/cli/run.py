@@ -162,10 +162,10 @@ def _run(
     todo: Plan, jobs: int, records: str | None, stage: Stage | None, *, json: bool
 ) -> tuple[list[Result], WorkerLostError | None]:
     """Run the jobs of a plan and show the scores; return the results, and the error if a worker was lost."""
+    from dubins_traffic.cli.long_enough import short_notice
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.cli.tables import show, summary
     from dubins_traffic.runs.jobs import run_trials
-    from dubins_traffic.scoring.long_enough import short_notice
 
     if not json:
         faults.warn(short_notice([job.drawn for job in {job.trial: job for job in todo.jobs}.values()]))

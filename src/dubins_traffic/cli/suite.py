@@ -207,8 +207,8 @@ def _trials(
     resume: bool,
 ) -> Path:
     from dubins_traffic.campaign.folder import kept
+    from dubins_traffic.cli.long_enough import short_notice
     from dubins_traffic.cli.progress import progress
-    from dubins_traffic.scoring.long_enough import short_notice
     from dubins_traffic.suites.running import run_suite
 
     faults.warn(short_notice(found.campaign(["simple"]).first_trials()))
