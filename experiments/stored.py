@@ -90,6 +90,11 @@ CLAIMS: Mapping[str, Claim] = {
         "theory.md#a-strategy-on-the-road",
         "half an hour",
     ),
+    "related": Claim(
+        "each trial on the road is a play of the game, up to the first breach of a rule",
+        "theory.md#the-game-and-the-road",
+        "some minutes",
+    ),
     "counter": Claim(
         "under an assumption that is too weak, a team of `counter` cars keeps the ego from a goal",
         "theory.md#a-counterstrategy-on-the-road",

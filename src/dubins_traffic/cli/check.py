@@ -21,11 +21,13 @@ if TYPE_CHECKING:
     from dubins_traffic.record.sink import Ending
     from dubins_traffic.scoring.score import Score
     from dubins_traffic.scoring.verdict import Verdict
+    from dubins_traffic.synthesis.related import Relation
 
 EXAMPLES = options.examples(
     "check out/*.mcap",
     "check out/trial-0000.mcap --json",
     "check out/*.mcap --formula 'on the road=[] on_road_ego'",
+    "check out/*.mcap --game",
 )
 NAMED = re.compile(r"([A-Za-z][\w -]{0,99})=(?!>)(.+)", re.DOTALL)
 """A formula with a name before it: a `=` that is none of the formula's own, as in `=>`."""
@@ -42,6 +44,12 @@ def check(
         list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)
     ],
     formula: FormulaOption = None,
+    game: Annotated[
+        bool,
+        typer.Option(
+            "--game", help="Say whether each trial is a play of the game that `synth` solves, move by move."
+        ),
+    ] = False,
     json: options.Json = False,
 ) -> None:
     """Judge recorded trials by the rules of the road and by formulas: verdicts, and every breach of every car.
@@ -60,13 +68,45 @@ def check(
         carrying = with_formulas(record.instance, {**record.instance.problem.formulas, **asked})
         read.append((name, from_poses(replace(record, instance=carrying))))
     scores = [(name, record.ending, score(record)) for name, record in read]
+    played = [
+        _relation(name, record, found[2]) for (name, record), found in zip(read, scores, strict=True) if game
+    ]
     if json:
         found = [_document(record, scored) for record, _, scored in scores]
+        for document, relation in zip(found, played, strict=False):
+            document["game"] = relation.to_json()
         print(json_text.dumps({"records": found}, indent=2))
     else:
-        for record, ending, scored in scores:
+        for k, (record, ending, scored) in enumerate(scores):
             _show(shown(record), ending, scored)
+            if game:
+                print(f"  {_played(played[k])}")
     faults.warn(assumption_notice(*ScoreSheet(tuple(scored for *_, scored in scores)).assumption_broken))
+
+
+def _relation(name: str, record: Record, scored: Score) -> Relation:
+    """Return what a trial is as a play of the game; InputError if it has none."""
+    from dubins_traffic.synthesis.related import relate
+
+    if scored.verdict is None:
+        raise InputError(
+            "the problem does not ask for the rules, so there is no game", file=name, field="rules"
+        )
+    try:
+        return relate(record, scored.verdict)
+    except InputError as error:
+        raise error.within(file=name) from None
+
+
+def _played(relation: Relation) -> str:
+    """Return what a trial is as a play of the game, in words."""
+    found = relation.unknown
+    if found is not None:
+        why = f", when {found.breach}" if found.breach else ""
+        play = f"a play of the game until {found.time:.3f} s{why}: {found.move} is no move of it"
+    else:
+        play = f"a play of the game: {relation.moves} moves"
+    return f"{play}; the ego took {relation.longest_move:.1f} s at most for a move that it had"
 
 
 def _formulas(given: list[str]) -> dict[str, str]:

@@ -29,7 +29,7 @@ from dubins_traffic.synthesis.followed_play import FollowedPlay
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import assumption_of, cells_of
 from dubins_traffic.synthesis.queues import Scene
-from dubins_traffic.synthesis.road_play import RoadPlay, Sight, Sighting
+from dubins_traffic.synthesis.road_play import EVERYWHERE, RoadPlay, Sight, Sighting
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.specification import EGO
 
@@ -44,7 +44,6 @@ BEFORE_LINE: Final = 0.2
 """A car that shall have no place in the order of arrival stands this far before it could take one, metres."""
 COMMITTED: Final = 0.85
 """A car nearer than this to the middle of a disc, in units of R, is on its way to an exit and keeps to it."""
-EVERYWHERE: Final = 1e9
 COUNTERSTRATEGY: Final = "counterstrategy"
 """Kind of the events that describe how the team keeps the ego from a goal."""
 

@@ -25,6 +25,8 @@ from dubins_traffic.synthesis.road_cells import RoadCells
 WAITS: Final = FLAG.STOPPED | FLAG.FIRST | FLAG.FORFEITED
 """The flags that say where in the order a car is."""
 NOWHERE: Final = -1
+EVERYWHERE: Final = 1e9
+"""A radius within which all cars are in view, metres."""
 
 
 class Sighting(NamedTuple):
@@ -60,12 +62,20 @@ class Ground:
     def cell(self, before: int, pose: Pose, seen: Propositions) -> int:
         """Return the cell of a car that was in the cell `before`, NOWHERE if that is not known.
 
-        A car is in an intersection while its body meets the disc, else in the lane of its lane state.
+        A car is in an intersection while its body meets the disc, else in the lane of its lane state. But who goes to
+        and fro over the edge of a bend or dead end has not moved: it holds the intersection until it is out in an exit,
+        and that lane until it comes to another intersection.
         """
         count = len(self.road_cells.nodes)
         if seen.crosses < 0:
-            return count + seen.lane if seen.lane >= 0 else before
+            came_in = 0 <= before < count and not self.road_cells.nodes[before].crossing
+            if seen.lane < 0 or (came_in and seen.lane in self.road_cells.nodes[before].inbound):
+                return before
+            return count + seen.lane
         nodes = self._nodes[seen.crosses]
+        here = [self.road_cells.nodes[node] for node in nodes]
+        if any(before - count in node.exits and not node.crossing for node in here):
+            return before
         if len(nodes) == 1 or before in nodes:
             return nodes[0] if len(nodes) == 1 else before
         if before >= count and self.road_cells.lane_end[before - count][0] in nodes:
@@ -197,8 +207,9 @@ class RoadPlay:
         What the game allows.
     noted : list of (str, str)
         Kind and detail of what the game does not know. The caller takes what is there.
-    checked, revised : int
-        How many moves have been looked up in the game, and how often an assumed place has been changed.
+    checked, revised, reordered : int
+        How many moves have been looked up in the game, how often an assumed place has been changed, and how often a car
+        has stopped before one that had come into its lane earlier.
     """
 
     def __init__(self, board: Board, sight: Sight, names: Sequence[str]) -> None:
@@ -209,6 +220,7 @@ class RoadPlay:
         self.noted: list[tuple[str, str]] = []
         self.checked = 0
         self.revised = 0
+        self.reordered = 0
         self._board = board
         self._sight = sight
         self._names = names
@@ -224,6 +236,15 @@ class RoadPlay:
     def at_lanes_end(self) -> bool:
         """Whether the ego holds the end of a lane, so that it has to decide what to do before an intersection."""
         return self.position is not None and self.cells[EGO_CAR] >= len(self._board.road_cells.nodes)
+
+    @property
+    def is_crowded(self) -> bool:
+        """Whether a car in view is behind another one in its cell, so that its place in the game is assumed."""
+        return len(self._shown) < len(self._seen)
+
+    def is_shown(self, car: int) -> bool:
+        """Say whether a car (index) is in the cell that it has in the game."""
+        return car in self._shown
 
     def follow(self, tick: int, cars: Sequence[Sighting]) -> bool:
         """Take in a frame, the ego first in `cars`; return whether anything has changed."""
@@ -369,6 +390,8 @@ class RoadPlay:
             if len(queue) > 1:
                 place = {car: k for k, car in enumerate(queue)}
                 queue.sort(key=lambda car: self._order(car, place[car]))
+                shown = [place[car] for car in queue if car in self._shown]
+                self.reordered += shown != sorted(shown)
 
     def _order(self, car: int, place: int) -> tuple[int, int, int]:
         if car not in self._shown:
