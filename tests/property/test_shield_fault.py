@@ -12,6 +12,7 @@ from dubins_traffic.cars.body import Body, Car, Disc, Rectangle
 from dubins_traffic.cars.state import Command, Labels, Pose
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.boxes import separation
+from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.rules.tables import Traffic, scratch, vehicles_of
 from dubins_traffic.policies.safety import body_at, may_meet, travel_of
 from dubins_traffic.problem.configuration import load_config
@@ -91,3 +92,43 @@ def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(
                     trials[b].starts,
                 )
     assert touched > 10
+
+
+@pytest.mark.parametrize("rate", [6.5, 10.0, 30.0])
+def test_a_disc_that_turns_as_it_leads_away_is_at_fault_in_no_contact(rate: float) -> None:
+    """At 10 Hz and less the other one can come round to where the car has turned by then.
+
+    Drawn is a contact, at any time of the tick: from it follows where the other one was at the beginning.
+    """
+    chance = np.random.default_rng(7)
+    document = {
+        "version": 1,
+        "problem_domain": "dubins_traffic",
+        "network": {"grid": {"rows": 2, "columns": 2}},
+    }
+    one = draw(load_config(document | {"number_trials": 1, "duration": 5, "rate": rate}), 1, 0)
+    vehicle: Any = vehicles_of([one.problem])[0]
+    period, most, radius, travel = 1.0 / rate, vehicle.yaw_most, vehicle.reach, travel_of(vehicle)
+    let = closes = 0
+    for _ in range(20_000):
+        command = Command(
+            0.7 * chance.uniform() ** 4 * chance.choice([-1.0, 1.0]), most * chance.choice([-1.0, 1.0])
+        )
+        at = period * chance.uniform(0.2, 1.0)
+        x, y, c, s = advance(0.0, 0.0, 1.0, 0.0, command.speed, command.yaw_rate, at)
+        ahead = 0.0 if command.speed > 0.0 else np.pi
+        bearing = np.arctan2(s, c) + ahead + chance.choice([-1.0, 1.0]) * chance.uniform(0.4, 0.6) * np.pi
+        far, whence = at / period * travel * chance.uniform(0.9, 1.0), chance.uniform(0.0, 2.0 * np.pi)
+        other = Pose(
+            x + 2.0 * radius * np.cos(bearing) + far * np.cos(whence),
+            y + 2.0 * radius * np.sin(bearing) + far * np.sin(whence), 1.0, 0.0,
+        )  # fmt: skip
+        own = Pose(0.0, 0.0, 1.0, 0.0)
+        gap = separation(body_at(own, vehicle), body_at(other, vehicle))[0]
+        if gap < 0.0 or may_meet(own, command, vehicle, other, travel):
+            continue
+        let += 1
+        closing = command.speed * (np.cos(bearing) * c + np.sin(bearing) * s)
+        closes += closing > 0.0
+    assert let > 300
+    assert closes == 0
