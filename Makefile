@@ -9,7 +9,7 @@ WORKERS ?= 4
 LCM := scripts/lcm_messages.py src/dubins_traffic/transports/lcm/dubins_traffic_lcm.lcm
 SETUP := pyproject.toml constraints.txt setup.py scripts/setup.sh $(LCM)
 
-.PHONY: help setup demo test test-tools kernels tools test-all golden docs results release check format schemas bench clean
+.PHONY: help setup demo test test-tools kernels tools test-all golden docs results release check format schemas proofs bench clean
 
 help: ## show this text
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
@@ -85,12 +85,15 @@ format: .venv/.installed-dev ## format the sources and mend what the linter can
 schemas: .venv/.installed-dev ## the JSON Schemas that the package ships, made from the models
 	$(BIN)/python -m scripts.schemas
 
+proofs: .venv/.installed-dev ## prove the lemmas of the shield and of the order of arrival, and refute planted flaws: minutes
+	$(BIN)/python -m proofs --flaws
+
 bench: .venv/.installed-dev ## speed, as ratios to limits measured in the same run: ten minutes
 	@$(BIN)/python -m benchmarks
 
 clean: ## remove .venv, the demo's output and everything that tools leave behind
 	rm -rf .venv demo-output out build dist .pytest_cache .ruff_cache .hypothesis .import_linter_cache
-	find src tests benchmarks experiments examples -name __pycache__ -prune -exec rm -rf {} +
+	find src tests benchmarks experiments examples proofs -name __pycache__ -prune -exec rm -rf {} +
 	rm -rf src/dubins_traffic.egg-info
 
 .venv/.installed-plot: $(SETUP)
