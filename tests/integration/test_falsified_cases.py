@@ -30,7 +30,8 @@ def test_the_shield_passes_the_cases_of_lanes() -> None:
 def test_rules_gets_past_who_stands_askew_beside_it() -> None:
     """It waited for good beside a car that moved while it was being passed, behind it or where it would return.
 
-    Or it had stopped, still left of its lane, where it could only go straight to the right before a disc.
+    Or it had stopped, still left of its lane, where it could only go straight to the right before a disc, or a little
+    back; or it did not lean past who stood in a bend.
     """
     assert [
         own.file.name for own in outcomes(cases_in(CONTRACT / "blocked"), "rules") if not own.passed
@@ -53,11 +54,12 @@ def test_who_keeps_the_law_leaves_discs_in_time_beside_an_ego_that_does_as_it_li
 def test_who_keeps_the_law_leaves_in_time_among_many() -> None:
     """Its exit taken late, it turned back across the whole crossing; it stood beside an ego that turned on the spot.
 
-    Or behind one that stood at the outer edge of a bend, though there was room to its left.
+    Or behind one that stood at the outer edge of a bend, or came a little over the line beside its exit.
     """
     found = list(outcomes(cases_in(WIDE), Free))
     assert [own.file.stem for own in found] == [
-        "leaves_a_crossing_late", "leaves_beside_who_stands_at_the_edge", "leaves_beside_who_turns",
+        "leaves_a_crossing_late", "leaves_beside_who_comes_over_the_line", "leaves_beside_who_stands_at_the_edge",
+        "leaves_beside_who_turns",
     ]  # fmt: skip
     assert [own.file.name for own in found if not own.passed] == []
 

@@ -10,11 +10,11 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
 from dubins_traffic.policies.rules.seeing import (
-    farthest_left,
     is_by_disc_behind,
     kept_beside,
     leans,
     leans_from,
+    leans_past,
     way_to_go,
 )
 from dubins_traffic.policies.rules.tables import Traffic
@@ -35,17 +35,24 @@ def lean(b: int, n: int, offset: float, part: int, way: ReferencePath, near: int
     """
     drivers = traffic.drivers
     free = near == 0 or offset != 0.0 or drivers.car[b, n].aside != 0.0
-    free = free or not (leans(drivers.vehicle[b]) or is_by_ego(b, n, traffic))
+    free = free or not (leans(drivers.vehicle[b]) or is_by_disc(b, n, near, traffic))
     free = free or not may_lean(b, n, way, traffic)
     return 0.0 if free else away_from(b, n, part, way, near, traffic)
 
 
 @jit_inline
-def is_by_ego(b: int, n: int, traffic: Traffic) -> bool:
-    """Tell whether the ego is near an e-agent and in a disc, where no centre line keeps it from reaching far over."""
+def is_by_disc(b: int, n: int, near: int, traffic: Traffic) -> bool:
+    """Tell whether the ego is near an e-agent and in a disc, where no centre line keeps it from reaching far over.
+
+    Or an e-agent near the ego; `near` (count) cars are listed.
+    """
     state, far = traffic.state, leans_from(traffic.drivers.vehicle[b])
-    dx, dy = state.x[b, EGO] - state.x[b, n], state.y[b, EGO] - state.y[b, n]
-    return n != EGO and traffic.labels.lane[b, EGO] < 0 and dx * dx + dy * dy <= far * far
+    for k in range(near):
+        j = traffic.scratch.near[k]
+        dx, dy = state.x[b, j] - state.x[b, n], state.y[b, j] - state.y[b, n]
+        if (j == EGO) != (n == EGO) and traffic.labels.lane[b, j] < 0 and dx * dx + dy * dy <= far * far:
+            return True
+    return False
 
 
 @jit_rare
@@ -78,7 +85,7 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
     """Return how far left of its way a car keeps clear of the listed bodies beside its lane, metres.
 
     Those have their centres left of the centre line; who is ahead or behind in the lane is not passed by leaning. Its
-    centre stays on the road. Only an ego that is in a disc as well, right of the way, is passed on its left. `near`
+    centre stays on the road. Only an ego in a disc is passed on its left as well, and an e-agent by the ego. `near`
     (count) cars are listed.
     """
     state, scratch, vehicle = traffic.state, traffic.scratch, traffic.drivers.vehicle[b]
@@ -101,6 +108,9 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
             if leans(vehicle):
                 edge = min(edge, vehicle.middle - vehicle.over)
             offset = min(offset, edge - clear)
-        elif j == EGO and left < 0.0 and part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:
-            offset = left + half + clear if left + half + clear <= farthest_left(vehicle) else offset
+        elif (j == EGO) != (n == EGO) and leans_past(b, j, left, px, py, traffic.drivers.car[b, n], traffic):
+            if left >= 0.0:
+                offset = min(offset, left - half - clear)
+            elif part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:
+                offset = left + half + clear
     return max(offset, EDGE - vehicle.middle)

@@ -170,7 +170,7 @@ def look_ahead(
             continue
         if left > ASTRAY and its_left > wide and comes_past(way, x, y, dx, dy, wide):
             continue
-        if j == EGO and n != EGO and leans_past(b, its_left, px, py, car, traffic):
+        if (j == EGO) != (n == EGO) and leans_past(b, j, its_left, px, py, car, traffic):
             continue
         passed = car.aside > 0.0 and labels.bits[b, j] & FLAG.STANDS != 0
         if passed and its_left < car.aside - wide + SIDE:
@@ -206,18 +206,18 @@ def comes_past(way: ReferencePath, x: float, y: float, dx: float, dy: float, wid
 
 
 @jit_rare
-def leans_past(b: int, left: float, px: float, py: float, car: Driver, traffic: Traffic) -> bool:
-    """Tell whether an e-agent gets past an ego in a disc, `left` (m) of the middle of its way, by leaning, as it will.
+def leans_past(b: int, j: int, left: float, px: float, py: float, car: Driver, traffic: Traffic) -> bool:
+    """Tell whether a car gets past car `j` in a disc, `left` (m) of the middle of its way, by leaning, as it will.
 
-    The way has the direction (`px`, `py`) there.
+    One of them is the ego. The way has the direction (`px`, `py`) there.
     """
     vehicle = traffic.drivers.vehicle[b]
-    if car.aside != 0.0 or traffic.labels.lane[b, EGO] >= 0:
+    if car.aside != 0.0 or traffic.labels.lane[b, j] >= 0:
         return False
-    kept = half_across(b, EGO, px, py, traffic.state, vehicle) + kept_beside(vehicle)
+    kept = half_across(b, j, px, py, traffic.state, vehicle) + kept_beside(vehicle)
     if left < 0.0:
         return left + kept <= farthest_left(vehicle)
-    return left > vehicle.middle and left - kept >= EDGE - vehicle.middle
+    return left - kept >= EDGE - vehicle.middle
 
 
 @jit_inline

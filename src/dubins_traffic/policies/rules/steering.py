@@ -150,10 +150,12 @@ def come_back(
         safe = is_safe_from(pose, b, Command(line.speed, 0.0), near, -1, traffic, vehicle)
     own = along(way, x, y)
     far = own < last_return(vehicle) + NARROWLY
-    if not (safe and line.speed >= CREEPS) and (far or keeps_off(own, line.left, vehicle)):
-        # Near the disc straight to the right to the end: at a slant it would come into the disc, still left.
-        left = line.left if far else 1.0
-        pose = Pose(x, y, *heading(Line(left, line.px, line.py, SLIDES), SQUARE))
+    back = 0.0 if far else backs_off(own, line.left, vehicle)
+    if not (safe and line.speed >= CREEPS) and back <= SLANT:
+        # Near the disc straight to the right to the end, or a little back: it would come into the disc, still left.
+        left, on = line.left if far else 1.0, sqrt(1.0 - back * back)
+        line = Line(left, line.px * on + line.py * back, line.py * on - line.px * back, SLIDES)
+        pose = Pose(x, y, *heading(line, SQUARE))
         if is_safe_from(pose, b, Command(SLIDES, 0.0), near, -1, traffic, vehicle):
             speed, yaw_rate = steer(
                 state.c[b, n], state.s[b, n], left, line.px, line.py, 0.0, SLIDES, SQUARE, EXACT,
@@ -164,13 +166,14 @@ def come_back(
 
 
 @jit_inline
-def keeps_off(own: float, left: float, vehicle: Vehicle) -> bool:
-    """Tell whether a car `left` (m) of its lane's middle keeps off the disc ahead as it goes straight to the right.
+def backs_off(own: float, left: float, vehicle: Vehicle) -> float:
+    """Return the sine of the angle back at which a car `left` (m) of its lane's middle keeps off the disc ahead.
 
-    It is at `own` (m) along the lane. Right of the centre line that brings it away from the disc.
+    It is at `own` (m) along the lane and goes to the right: along the disc first, so that it is far enough back at the
+    centre line, right of which it gets away from the disc.
     """
-    beside, room = max(vehicle.middle - left, 0.0), vehicle.disc + vehicle.reach + CLOSE
-    return own * own + beside * beside > room * room
+    over, room = left - vehicle.middle, vehicle.disc + vehicle.reach + CLOSE
+    return (room + own) / over + over / room if over > CLOSE and room + own > 0.0 else 0.0
 
 
 @jit_inline
