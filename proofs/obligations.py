@@ -16,7 +16,9 @@ from proofs import arrival, contact, quiet
 from proofs.claims import Obligation
 
 SHIELD: Final = "design/014-shield.md#on-straight-roads"
-ANY: Final = "every body, segment (straight or bent), disc and rate; roads 0.2 m wide and `turn_back` 2 cm at least"
+ANY: Final = (
+    "every body, segment (straight or bent), disc and rate; roads 0.2 m wide and `turn_back` 2 cm at least"
+)
 ANY_RATE: Final = "every rate and every bound of speed and yaw rate"
 
 OBLIGATIONS: Final = {
