@@ -16,6 +16,7 @@ from dubins_traffic.errors import InputError
 
 if TYPE_CHECKING:
     from dubins_traffic.maps.losses import Losses
+    from dubins_traffic.maps.part import Part
     from dubins_traffic.roads.network import RoadNetwork
 
 LossesOption = Annotated[
@@ -28,13 +29,16 @@ LossesOption = Annotated[
 ]
 
 
-def imported(file: str, scale: float | None, w: float | None, tolerance: float) -> RoadNetwork:
+def imported(
+    file: str, scale: float | None, w: float | None, tolerance: float, part: Part | None = None
+) -> RoadNetwork:
     """Return the network that a file holds, of whatever format; InputError if it holds none, or nothing can be held.
 
-    Where a scale is given and `w` is not, that is half a lane of the map at the scale.
+    Where a scale is given and `w` is not, that is half a lane of the map at the scale. A `part` of it must have a loop.
     """
     from dubins_traffic.files import read_text
     from dubins_traffic.maps.foreign import ForeignFormat
+    from dubins_traffic.maps.part import require_loop
     from dubins_traffic.maps.settings import ImportSettings, W
     from dubins_traffic.roads.formats import registry as formats
     from dubins_traffic.roads.network import RoadNetwork
@@ -42,19 +46,34 @@ def imported(file: str, scale: float | None, w: float | None, tolerance: float) 
     text = read_text(file)
     form = formats.of_text(text)
     if not isinstance(form, ForeignFormat):
-        require_no_scale(file, scale, w)
+        require_no_scale(file, scale, w, part)
         return RoadNetwork.from_text(text, file, form)
     settings = ImportSettings(w=W if w is None else w, scale=scale, tolerance=tolerance)
     own = scale is not None and w is None
-    document, losses = form.reduced(text, file, settings, own_lanes=own)
+    document, losses = form.reduced(text, file, settings, own_lanes=own, part=part)
     network = RoadNetwork.from_document(document, file)
+    if part is not None:
+        require_loop(network, losses, part, file)
     network.known[formats.LOSSES] = losses
     return network
 
 
-def require_no_scale(source: str | None, scale: float | None, w: float | None) -> None:
-    """Refuse a scale and a `w` where the network in `source` comes from no map of another program."""
-    for name, given in (("--scale", scale), ("--w", w)):
+def part_asked(clip: str | None, around: tuple[str, float] | None) -> Part | None:
+    """Return the part of a map that is asked for, None if all of it is; InputError if it is none, or two are."""
+    from dubins_traffic.maps.part import CLIP, Around, Box
+
+    if clip is not None and around is not None:
+        raise InputError("two parts at once", file=CLIP, value=clip, expected="--clip or --around, not both")
+    if clip is not None:
+        return Box.read(clip)
+    return None if around is None else Around(*around)
+
+
+def require_no_scale(
+    source: str | None, scale: float | None, w: float | None, part: Part | None = None
+) -> None:
+    """Refuse a scale, a `w` and a part where the network in `source` comes from no map of another program."""
+    for name, given in (("--scale", scale), ("--w", w), (str(part).partition(" ")[0], part)):
         if given is not None:
             raise InputError(
                 "nothing to reduce", file=name, value=source, expected="--from a map of another program"

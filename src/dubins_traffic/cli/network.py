@@ -15,6 +15,7 @@ EXAMPLES = options.examples(
     "network --intersections 20 --segments 30 --seed 7 -o town.json",
     "network --intersections 9 --segments 11 --format text",
     "network --from town.net.xml -o town.json --losses losses.png",
+    "network --from town.net.xml --around J12 400 -o part.json",
 )
 
 
@@ -80,6 +81,23 @@ ToleranceOption = Annotated[
     typer.Option("--tolerance", metavar="D", help="How far a road may be from the map's, metres of the map."),
 ]
 
+ClipOption = Annotated[
+    str | None,
+    typer.Option(
+        "--clip",
+        metavar="X0,Y0,X1,Y1",
+        help="Of a map, the roads wholly in this rectangle, metres of the map.",
+    ),
+]
+AroundOption = Annotated[
+    tuple[str, float] | None,
+    typer.Option(
+        "--around",
+        metavar="JUNCTION RADIUS",
+        help="Of a map, the roads wholly within so many metres of a junction.",
+    ),
+]
+
 
 def network(
     intersections: IntersectionsOption = None,
@@ -90,6 +108,8 @@ def network(
     scale: ScaleOption = None,
     w: WidthOption = None,
     tolerance: ToleranceOption = 0.1,
+    clip: ClipOption = None,
+    around: AroundOption = None,
     losses: maps.LossesOption = None,
     seed: options.Seed = 0,
     format: Annotated[Format, typer.Option("--format", help="Container of the network.")] = Format.JSON,
@@ -105,15 +125,16 @@ def network(
     options.require(
         output, "a road network", suffixes, overwrite=overwrite, apart_from=[source], standard=True
     )
+    part = maps.part_asked(clip, around)
     if source is None:
-        maps.require_no_scale(None, scale, w)
+        maps.require_no_scale(None, scale, w, part)
     if source is not None:
         if (intersections, segments, grid) != (None, None, None):
             raise InputError(
                 "two networks at once", file="--from", value=source, expected="nothing else beside it"
             )
         with maps.telling(losses, source, output, overwrite=overwrite):
-            made = maps.imported(source, scale, w, tolerance)
+            made = maps.imported(source, scale, w, tolerance, part)
     elif intersections is None and segments is None:
         rows, columns = grid or (3, 4)
         made = RoadNetwork.grid(rows, columns)

@@ -18,6 +18,7 @@ from typing import Any, Literal
 from dubins_traffic.errors import InputError
 from dubins_traffic.maps.from_rnd import corners_text, read_corners, read_frame, road_map
 from dubins_traffic.maps.model import RoadMap
+from dubins_traffic.maps.part import Part, part_of
 from dubins_traffic.maps.reduction import Reduction, reduction
 from dubins_traffic.maps.settings import ImportSettings
 
@@ -56,9 +57,15 @@ class ForeignFormat(ABC):
         settings: ImportSettings | None = None,
         *,
         own_lanes: bool = False,
+        part: Part | None = None,
     ) -> Reduction:
-        """Return the network to which a text is reduced, and what was lost; see `maps.reduction.reduction`."""
-        return reduction(self.read_map(text, file), settings, file, own_lanes=own_lanes)
+        """Return the network to which a text, or a part of its map, is reduced, and what was lost.
+
+        See `maps.reduction.reduction`.
+        """
+        found = self.read_map(text, file)
+        found = found if part is None else part_of(found, part, file)
+        return reduction(found, settings, file, own_lanes=own_lanes)
 
 
 class WrittenFormat(ForeignFormat):
