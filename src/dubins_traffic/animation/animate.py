@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import base64
-import importlib
 import math
 import os
 from collections.abc import Callable, Iterator, Sequence
-from fractions import Fraction
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
 from dubins_traffic.animation.indexed import GIF_RATE, write_gif, write_png
 from dubins_traffic.animation.raster import NO_MARKS, SIZES, Raster, picture_size
 from dubins_traffic.animation.raster_kernel import MARKS, Image
+from dubins_traffic.animation.video import CODECS, Video, library
 from dubins_traffic.cars.state import EGO, NONE
-from dubins_traffic.errors import InputError, needs
+from dubins_traffic.errors import InputError
 from dubins_traffic.files import replace_file, require_output
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Problem
@@ -25,11 +24,6 @@ from dubins_traffic.record.reader import Record
 from dubins_traffic.scoring.verdict import Verdict
 from dubins_traffic.viewer.marks import goal_visits
 
-CODECS: Final[dict[str, tuple[str, str, dict[str, str]]]] = {
-    ".mp4": ("mp4", "libx264", {"crf": "27", "preset": "medium", "tune": "animation"}),
-    ".webm": ("webm", "libvpx-vp9", {"crf": "36", "b": "0", "deadline": "realtime", "cpu-used": "6"}),
-}
-"""Of videos by their suffix: the container, the codec and its options."""
 SUFFIXES: Final = (".gif", ".png", *CODECS)
 """How names of moving pictures end."""
 FPS: Final = 10.0
@@ -226,18 +220,9 @@ class Animation:
         return list(self._paint(sorted({0, len(self) // 3, 2 * len(self) // 3, len(self) - 1})))
 
     def _write_video(self, draft: Path, suffix: str, pictures: Iterator[Image]) -> None:
-        container, codec, options = CODECS[suffix]
-        av = _library("av")
-        bare: dict[str, str] = {"fflags": "+bitexact"}
-        if container == "mp4":
-            bare["movflags"] = "+faststart"
-        with av.open(str(draft), "w", format=container, options=bare) as file:
-            stream = file.add_stream(codec, rate=Fraction(self.fps).limit_denominator(1000), options=options)
-            stream.width, stream.height = self._shape
-            stream.pix_fmt = "yuv420p"
+        with Video(draft, suffix, self.fps, self._shape) as video:
             for image in pictures:
-                file.mux(stream.encode(av.VideoFrame.from_ndarray(image, format="rgb24")))
-            file.mux(stream.encode())
+                video.add(image)
 
     def _repr_html_(self) -> str:
         data = b"".join(write_png(iter(self), self._samples(), len(self), min(self.fps, GIF_RATE)))
@@ -278,14 +263,9 @@ def require_moving(
     require_output(path, "a moving picture", (*SUFFIXES, *others), overwrite=overwrite, apart_from=apart_from)
     suffix = Path(path).suffix.lower()
     if suffix in CODECS:
-        _library("av")
+        library("av")
     elif suffix == ".gif":
-        _library("PIL")
-
-
-def _library(name: str) -> Any:
-    with needs("a GIF" if name == "PIL" else "a video", "video"):
-        return importlib.import_module(name)
+        library("PIL")
 
 
 def _require_within(field: str, value: float, least: float, most: float) -> None:

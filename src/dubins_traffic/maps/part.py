@@ -42,8 +42,9 @@ class Box:
 
     def holds(self, points: Floats, found: RoadMap, file: str | None) -> npt.NDArray[np.bool_]:  # noqa: ARG002  # as `Around`
         """Tell of points (N, 2) of a map which are in the rectangle."""
-        low, high = (self.x0, self.y0), (self.x1, self.y1)
-        return ((points >= low) & (points <= high)).all(axis=1)
+        x, y = points[:, 0], points[:, 1]
+        inside: npt.NDArray[np.bool_] = (self.x0 <= x) & (x <= self.x1) & (self.y0 <= y) & (y <= self.y1)
+        return inside
 
     def __str__(self) -> str:
         return f"{CLIP} {self.x0:g},{self.y0:g},{self.x1:g},{self.y1:g}"
@@ -71,7 +72,8 @@ class Around:
                 expected=f"one of the map's {len(found.junctions)}, such as {', '.join(like)}",
             )  # fmt: skip
         x, y, _ = found.junctions[self.junction]
-        return np.hypot(points[:, 0] - x, points[:, 1] - y) <= self.radius
+        far: Floats = np.hypot(points[:, 0] - x, points[:, 1] - y)
+        return far <= self.radius
 
     def __str__(self) -> str:
         return f"{AROUND} {self.junction} {self.radius:g}"
