@@ -20,6 +20,7 @@ from scipy.sparse.csgraph import connected_components
 
 from dubins_traffic.rules import queue
 from proofs.claims import RefutedError
+from proofs.terms import replaced
 
 GROUP, FORFEIT = 1, 2
 """`group_ticks` and `forfeit_ticks` of the model: with more there are more states, and the same comparisons."""
@@ -161,9 +162,5 @@ def orders() -> Iterator[tuple[int, ...]]:
 
 def order_of_arrival() -> int:
     """Prove that just one is first, that nobody comes before an earlier group, and that nobody waits for ever."""
-    kept = vars(queue)["lane_end_direction"]
-    vars(queue)["lane_end_direction"] = lambda _roads, _net, lane: ARMS[lane]
-    try:
+    with replaced(queue, {"lane_end_direction": lambda _roads, _net, lane: ARMS[lane]}):
         return sum(explored(order) for order in orders())
-    finally:
-        vars(queue)["lane_end_direction"] = kept

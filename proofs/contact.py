@@ -21,7 +21,7 @@ from dubins_traffic.cars.state import EGO, Command, Pose
 from dubins_traffic.policies import safety
 from dubins_traffic.shield import checks
 from proofs.claims import RefutedError
-from proofs.terms import SQUARE, Explorer, Real, Truth, greatest, least, real_of, truth_of, z3
+from proofs.terms import SQUARE, Explorer, Real, Truth, greatest, least, real_of, replaced, truth_of, z3
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator
@@ -93,13 +93,8 @@ def instead(meeting: Meeting, **more: Any) -> Iterator[None]:
         "advance": meeting.advance, "separation": meeting.separation, "min": least, "max": greatest,
         "half_extent": lambda *_: Real("extent"), "moved_by": lambda *_: meeting.own,
     }  # fmt: skip
-    kept = dict(vars(safety))
-    vars(safety).update(names | more)
-    try:
+    with replaced(safety, names | more):
         yield
-    finally:
-        vars(safety).clear()
-        vars(safety).update(kept)
 
 
 def runs(meeting: Meeting, code: Callable[[], Any], *premises: Any) -> Iterator[tuple[Explorer, Any]]:
@@ -215,10 +210,9 @@ def nobody_near_is_overlooked() -> int:
     """Prove that who is not listed by `gather_close` can't be touched in the tick."""
     own, count = Meeting(disc=True), 0
     distance, listed = Real("distance"), SimpleNamespace(near=[0, 0])
-    state: Any = SimpleNamespace(count=[2], x=_Pairs("x"), y=_Pairs("y"))
-    kept = dict(vars(checks))
-    vars(checks).update(within_sight=lambda *_: True, travel_of=lambda _: own.travel)
-    try:
+    places = {name: {(0, n): Real(f"{name}_of_{n}") for n in range(2)} for name in "xy"}
+    state: Any = SimpleNamespace(count=[2], **places)
+    with replaced(checks, {"within_sight": lambda *_: True, "travel_of": lambda _: own.travel}):
         for through, near in runs(
             own,
             lambda: checks.gather_close(0, state, -1.0, own.car, listed),  # pyright: ignore[reportArgumentType]
@@ -231,20 +225,7 @@ def nobody_near_is_overlooked() -> int:
             then = distance.term - 2 * own.car.reach.term - own.own.term * own.time.term
             if through.may(then - own.travel.term * own.time.term <= 0):
                 raise RefutedError("a car that can be touched is not listed")
-    finally:
-        vars(checks).clear()
-        vars(checks).update(kept)
     return count
-
-
-class _Pairs:
-    """A coordinate of the cars, by (trial, car)."""
-
-    def __init__(self, name: str) -> None:
-        self._values = {(0, n): Real(f"{name}_of_{n}") for n in range(2)}
-
-    def __getitem__(self, key: tuple[int, int]) -> Real:
-        return self._values[key]
 
 
 def no_obstacle_is_hit() -> int:

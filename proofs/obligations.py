@@ -14,6 +14,7 @@ from dubins_traffic.rules import queue
 from dubins_traffic.shield import checks, nearest_command
 from proofs import arrival, contact, quiet
 from proofs.claims import Obligation
+from proofs.terms import replaced
 
 SHIELD: Final = "design/014-shield.md#on-straight-roads"
 ANY: Final = (
@@ -129,13 +130,7 @@ def planted(flaw: Flaw) -> Iterator[None]:
     source = inspect.getsource(flaw.module)
     if source.count(flaw.right) != 1:
         raise ValueError(f"{flaw.module.__name__} has {source.count(flaw.right)} places {flaw.right!r}")
-    kept = dict(vars(flaw.module))
-    try:
-        exec(
-            compile(source.replace(flaw.right, flaw.wrong), str(flaw.module.__file__), "exec"),
-            vars(flaw.module),
-        )
+    wrong = compile(source.replace(flaw.right, flaw.wrong), str(flaw.module.__file__), "exec")
+    with replaced(flaw.module, {}):
+        exec(wrong, vars(flaw.module))  # our own source, with the flaw
         yield
-    finally:
-        vars(flaw.module).clear()
-        vars(flaw.module).update(kept)

@@ -11,7 +11,7 @@ below 1e-15 m.
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Final
 
@@ -33,6 +33,7 @@ from proofs.terms import (
     greatest,
     least,
     real_of,
+    replaced,
     whole_of,
     z3,
 )
@@ -46,22 +47,21 @@ OTHER: Final = 1
 """Another car, which may be in a disc."""
 
 
-def function(name: str, *kinds: Any) -> Any:
-    """Return a function of which nothing is known; the last of `kinds` is that of its values."""
-    return z3.Function(name, *kinds)
-
-
 _R, _Z = z3.RealSort(), z3.IntSort()
-NEAREST, OFF2 = function("nearest_segment", _R, _R, _Z), function("off2", _R, _R, _R)
-VERTEX, AWAY2 = function("nearest_vertex", _R, _R, _Z), function("vertex_distance2", _Z, _R, _R, _R)
-SEGMENT2 = function("distance2", _Z, _R, _R, _R)
-BODY2 = function("distance2_to_body", _Z, _R, _R, _R, _R, _R)
-ALONG, ACROSS = function("progress", _Z, _R, _R, _R), function("lateral", _Z, _R, _R, _R)
-TX, TY = function("lane_direction_x", _Z, _R, _R, _R), function("lane_direction_y", _Z, _R, _R, _R)
-EXTENT = function("half_extent", _R, _R, _R, _R, _R)
-AWAY = function("lane_away", _Z, _R, _R, _Z)
-HEADING = function("lane_by_heading", _Z, _R, _R, _R, _R, _Z)
-DEGREE, END, LENGTH = function("degree", _Z, _Z), function("lane_end", _Z, _Z), function("length", _Z, _R)
+NEAREST, OFF2 = z3.Function("nearest_segment", _R, _R, _Z), z3.Function("off2", _R, _R, _R)
+VERTEX, AWAY2 = z3.Function("nearest_vertex", _R, _R, _Z), z3.Function("vertex_distance2", _Z, _R, _R, _R)
+SEGMENT2 = z3.Function("distance2", _Z, _R, _R, _R)
+BODY2 = z3.Function("distance2_to_body", _Z, _R, _R, _R, _R, _R)
+ALONG, ACROSS = z3.Function("progress", _Z, _R, _R, _R), z3.Function("lateral", _Z, _R, _R, _R)
+TX, TY = z3.Function("lane_direction_x", _Z, _R, _R, _R), z3.Function("lane_direction_y", _Z, _R, _R, _R)
+EXTENT = z3.Function("half_extent", _R, _R, _R, _R, _R)
+AWAY = z3.Function("lane_away", _Z, _R, _R, _Z)
+HEADING = z3.Function("lane_by_heading", _Z, _R, _R, _R, _R, _Z)
+DEGREE, END, LENGTH = (
+    z3.Function("degree", _Z, _Z),
+    z3.Function("lane_end", _Z, _Z),
+    z3.Function("length", _Z, _R),
+)
 ITS_CROSSES = z3.Int("its_crosses")
 
 
@@ -289,8 +289,11 @@ PLAIN: Final[dict[str, Any]] = {
 
 
 @contextmanager
-def instead(world: World, **shield: Any) -> Iterator[None]:
-    """Let the modules of shield, labeller and referee call terms; in `shield.checks` also what `shield` names."""
+def instead(world: World, shield: dict[str, Any], located: dict[str, Any]) -> Iterator[None]:
+    """Let the modules of shield, labeller and referee call terms.
+
+    What `shield` and `located` name are left out of `shield.checks` and of `rules.location`.
+    """
     asked = PLAIN | geometry(world)
     cached = dict.fromkeys(
         ("_change_lists", "note_growth", "keep_region", "keep_arm", "growth_row", "keep_road"), _nothing
@@ -309,19 +312,14 @@ def instead(world: World, **shield: Any) -> Iterator[None]:
 
     changes = (
         (checks, asked | {"advance": world.advance, "may_touch": lambda *_: False} | shield),
-        (nearest_command, asked), (lane_state, asked), (location, asked | cached | flags),
+        (nearest_command, asked), (lane_state, asked), (location, asked | cached | flags | located),
         (frame, asked | alone), (referee_kernel, asked | {"_judge_entry": enter}),
         (breaches, {"add": add}),
     )  # fmt: skip
-    kept = [(module, dict(vars(module))) for module, _ in changes]
-    for module, names in changes:
-        vars(module).update(names)
-    try:
+    with ExitStack() as stack:
+        for module, names in changes:
+            stack.enter_context(replaced(module, names))
         yield
-    finally:
-        for module, names in kept:
-            vars(module).clear()
-            vars(module).update(names)
 
 
 NO_LANE: Final = {"lane_here": lambda *_: (0, True), "along_lane": lambda *_: (0, 0.0, 0.0, False)}
@@ -342,8 +340,7 @@ def keeps(refused: dict[str, Any], located: dict[str, Any], *, lane: bool) -> in
     def tick() -> int:
         world = World(crossings=not lane)
         worlds.append(world)
-        with instead(world, **refused):
-            vars(location).update(located)
+        with instead(world, refused, located):
             reason = checks.refusal(0, Real("speed"), Real("yaw_rate"), 0, world.traffic, world.shields)
             if reason == REASON.NOTHING:
                 tables = world.tables
@@ -395,8 +392,7 @@ def top_is_kept() -> int:
         own = World()
         own.advance()
         own.ego.last_lane, own.ego.last_at, own.ego.last_tick = own.lane, own.at, own.tick - 1
-        with instead(own):
-            vars(location).update(NO_REACH | NO_ENTRY)
+        with instead(own, {}, NO_REACH | NO_ENTRY):
             location.locate(0, EGO, own.tick, own.tables)
             traffic = own.traffic
             traffic.state = _state(own.after)

@@ -8,9 +8,11 @@ execution and program testing*, CACM 19, 1976).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from fractions import Fraction
 from importlib import import_module
+from types import ModuleType
 from typing import Any, ClassVar, Final
 
 z3: Any = import_module("z3")
@@ -19,6 +21,18 @@ BITS: Final = 32
 """Width of flags."""
 SQUARE: Final = z3.Function("square", z3.RealSort(), z3.RealSort())
 """The square of a number. Of squares the solver is told only that they grow: that is enough, and quick."""
+
+
+@contextmanager
+def replaced(module: ModuleType, names: Mapping[str, Any]) -> Iterator[None]:
+    """Let names of a module stand for something else meanwhile; whatever is done to it is undone then."""
+    kept = dict(vars(module))
+    module.__dict__.update(names)
+    try:
+        yield
+    finally:
+        module.__dict__.clear()
+        module.__dict__.update(kept)
 
 
 class Truth:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from dubins_traffic.cli.main import main
 from dubins_traffic.errors import InputError
 from dubins_traffic.maps.model import Junction, Road, RoadMap
-from dubins_traffic.maps.part import Around, Box, part_of
+from dubins_traffic.maps.part import Around, Clip, part_of
 
 VILLAGE = str(Path(__file__).parents[2] / "examples" / "maps" / "village.net.xml")
 SIDE = 5
@@ -33,7 +33,7 @@ def lattice() -> RoadMap:
 
 @given(low=st.integers(-50, 400), size=st.integers(101, 500))
 def test_a_part_has_the_roads_that_lie_wholly_in_it_and_their_junctions(low: int, size: int) -> None:
-    box = Box(low, low, low + size, low + size)
+    box = Clip(low, low, low + size, low + size)
     inside = [k for k in range(SIDE) if low <= 100 * k <= low + size]
     try:
         found = part_of(lattice(), box)

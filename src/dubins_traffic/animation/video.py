@@ -67,5 +67,8 @@ class Video:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
+    def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            self.close()
+        else:  # what the codec would say of a broken video must not hide why it is broken
+            self._file.close()

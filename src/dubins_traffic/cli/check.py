@@ -67,21 +67,20 @@ def check(
         record = load_record(name)
         carrying = with_formulas(record.instance, {**record.instance.problem.formulas, **asked})
         read.append((name, from_poses(replace(record, instance=carrying))))
-    scores = [(name, record.ending, score(record)) for name, record in read]
-    played = [
-        _relation(name, record, found[2]) for (name, record), found in zip(read, scores, strict=True) if game
+    scores = [score(record) for _, record in read]
+    judged = [
+        (name, record.ending, scored, _relation(name, record, scored) if game else None)
+        for (name, record), scored in zip(read, scores, strict=True)
     ]
     if json:
-        found = [_document(record, scored) for record, _, scored in scores]
-        for document, relation in zip(found, played, strict=False):
-            document["game"] = relation.to_json()
+        found = [_document(record, scored, relation) for record, _, scored, relation in judged]
         print(json_text.dumps({"records": found}, indent=2))
     else:
-        for k, (record, ending, scored) in enumerate(scores):
+        for record, ending, scored, relation in judged:
             _show(shown(record), ending, scored)
-            if game:
-                print(f"  {_played(played[k])}")
-    faults.warn(assumption_notice(*ScoreSheet(tuple(scored for *_, scored in scores)).assumption_broken))
+            if relation is not None:
+                print(f"  {_played(relation)}")
+    faults.warn(assumption_notice(*ScoreSheet(tuple(scores)).assumption_broken))
 
 
 def _relation(name: str, record: Record, scored: Score) -> Relation:
@@ -121,9 +120,9 @@ def _formulas(given: list[str]) -> dict[str, str]:
     return found
 
 
-def _document(record: str, score: Score) -> dict[str, Any]:
+def _document(record: str, score: Score, relation: Relation | None) -> dict[str, Any]:
     verdict = score.verdict
-    document = {
+    document: dict[str, Any] = {
         "record": record,
         "end": score.end,
         "clean": None if verdict is None else verdict.clean,
@@ -137,6 +136,8 @@ def _document(record: str, score: Score) -> dict[str, Any]:
     }
     if score.formulas:
         document["formulas"] = [found.to_json() for found in score.formulas]
+    if relation is not None:
+        document["game"] = relation.to_json()
     return document
 
 

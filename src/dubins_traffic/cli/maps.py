@@ -60,12 +60,12 @@ def imported(
 
 def part_asked(clip: str | None, around: tuple[str, float] | None) -> Part | None:
     """Return the part of a map that is asked for, None if all of it is; InputError if it is none, or two are."""
-    from dubins_traffic.maps.part import CLIP, Around, Box
+    from dubins_traffic.maps.part import CLIP, Around, Clip
 
     if clip is not None and around is not None:
         raise InputError("two parts at once", file=CLIP, value=clip, expected="--clip or --around, not both")
     if clip is not None:
-        return Box.read(clip)
+        return Clip.read(clip)
     return None if around is None else Around(*around)
 
 

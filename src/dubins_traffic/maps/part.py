@@ -21,7 +21,7 @@ BOX: Final = "X0,Y0,X1,Y1, metres of the map, with X0 < X1 and Y0 < Y1"
 
 
 @dataclass(frozen=True, slots=True)
-class Box:
+class Clip:
     """A rectangle of a map, metres of it."""
 
     x0: float
@@ -30,7 +30,7 @@ class Box:
     y1: float
 
     @classmethod
-    def read(cls, text: str) -> Box:
+    def read(cls, text: str) -> Clip:
         """Return the rectangle that a text names as ``X0,Y0,X1,Y1``; InputError if it names none."""
         try:
             x0, y0, x1, y1 = (float(number) for number in text.split(","))
@@ -79,7 +79,7 @@ class Around:
         return f"{AROUND} {self.junction} {self.radius:g}"
 
 
-Part = Box | Around
+Part = Clip | Around
 
 
 def part_of(found: RoadMap, part: Part, file: str | None = None) -> RoadMap:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from dubins_traffic.agents.lawful import drivers_of
-from dubins_traffic.cars.state import Labels, Pose, Propositions, State
+from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
@@ -29,7 +29,7 @@ from dubins_traffic.synthesis.followed_play import FollowedPlay
 from dubins_traffic.synthesis.game import build
 from dubins_traffic.synthesis.instance import assumption_of, cells_of
 from dubins_traffic.synthesis.queues import Scene
-from dubins_traffic.synthesis.road_play import EVERYWHERE, RoadPlay, Sight, Sighting
+from dubins_traffic.synthesis.road_play import RoadPlay, Sight, Sighting, sighted
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.specification import EGO
 
@@ -80,8 +80,7 @@ class CounterTeam:
         board = Board(cells_of(problem), _assumed(instance), len(instance.e_agents))
         self._board = board
         self._guide = _followed(instance, board) or Counterstrategy(solve(build(board)))
-        sight = Sight(EVERYWHERE, 0.0, max(1, round(problem.rate)), assume_ego=True)
-        self._play = RoadPlay(board, sight, instance.names)
+        self._play = RoadPlay(board, Sight.of_all(problem.rate), instance.names)
         self._targets = [-1] * len(instance.starts)
         self._scenes: list[Scene] = []
         self._jumps = board.assumption.order is not Order.KEPT
@@ -94,7 +93,7 @@ class CounterTeam:
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (1, N, 2)."""
-        cars = [_sighting(n, state, labels) for n in range(int(state.count[0]))]
+        cars = [sighted(0, n, state, labels) for n in range(int(state.count[0]))]
         if self._play.follow(tick, cars):
             self._choose(tick, cars)
         if self._jumps:
@@ -245,12 +244,6 @@ def _common(instance: Instance, name: str, must: str) -> Any:
             value=sorted({str(own), *map(str, others)}), expected="equal values for all e-agents of the kind counter",
         )  # fmt: skip
     return own
-
-
-def _sighting(n: int, state: State, labels: Labels) -> Sighting:
-    pose = Pose(*(float(array[0, n]) for array in (state.x, state.y, state.c, state.s)))
-    seen: Any = [int(array[0, n]) for array in labels]
-    return Sighting(n, pose, Propositions(*seen))
 
 
 def _drivers(instance: Instance) -> Drivers:

@@ -44,6 +44,11 @@ def assumption_of(problem: Problem) -> Assumption:
     return Assumption.parse(part for part in PARTS if getattr(rules, f"assume_{part.lower()}"))
 
 
+def board_of(problem: Problem) -> Board:
+    """Return the board of a problem's game; InputError as `RoadCells.of`."""
+    return Board(cells_of(problem), assumption_of(problem), len(problem.e_agents))
+
+
 def start_positions(board: Board, instance: Instance) -> list[int]:
     """Return the positions in which an instance may start; none if two cars start in one cell, or others play.
 

@@ -8,18 +8,18 @@ from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Pose, Propositions
+from dubins_traffic.cars.state import EGO
 from dubins_traffic.errors import InputError
 from dubins_traffic.synthesis.board import Board
-from dubins_traffic.synthesis.instance import assumption_of, cells_of
+from dubins_traffic.synthesis.instance import board_of
 from dubins_traffic.synthesis.road_play import (
-    EVERYWHERE,
     NEW_TICKET,
     UNKNOWN_MOVE,
     WAITS,
     RoadPlay,
     Sight,
     Sighting,
+    sighted,
 )
 
 if TYPE_CHECKING:
@@ -77,14 +77,14 @@ class Relation:
         return {"related": self.related, **asdict(self)}
 
 
-def board_of(problem: Problem) -> Board:
+def checked_board(problem: Problem) -> Board:
     """Return the board of a problem's game.
 
     InputError if the problem has no goals or no other cars, or the game has more than `MOST_POSITIONS` positions.
     """
     if not problem.e_agents:
         raise InputError("no e-agents, so there is no game", field="e-agents", expected="at least one")
-    board = Board(cells_of(problem), assumption_of(problem), len(problem.e_agents))
+    board = board_of(problem)
     if board.positions > MOST_POSITIONS:
         raise InputError(
             "too large a game to look moves up", value=f"{board.positions} positions",
@@ -106,17 +106,17 @@ def relate(record: Record, verdict: Verdict) -> Relation:
     Raises
     ------
     InputError
-        As `board_of`.
+        As `checked_board`.
     """
     instance, frames = record.instance, record.frames
-    board = board_of(instance.problem)
-    look = max(1, round(frames.rate))
-    play = RoadPlay(board, Sight(EVERYWHERE, 0.0, look, assume_ego=True), instance.names)
+    board = checked_board(instance.problem)
+    sight = Sight.of_all(frames.rate)
+    play = RoadPlay(board, sight, instance.names)
     first = min(verdict.violations, key=lambda breach: breach.time, default=None)
     unknown: UnknownMove | None = None
     renewed = crowded = longest = 0
     cell, since, before = -1, -1, 0
-    for tick, cars in _sightings(frames, look):
+    for tick, cars in _sightings(frames, sight.look):
         crowded += (tick - before) * play.is_crowded
         before = tick
         play.follow(tick, cars)
@@ -149,15 +149,6 @@ def _sightings(frames: Frames, look: int) -> Iterator[tuple[int, list[Sighting]]
     changed[::look] = True
     for column in (frames.crosses, frames.lane, waits):
         changed[1:] |= (column[1:] != column[:-1]).any(axis=1)
+    state, labels = frames.states
     for tick in np.flatnonzero(changed).tolist():
-        poses, labels = (
-            np.stack([getattr(frames, name)[tick] for name in names], axis=1).tolist()
-            for names in (("x", "y", "c", "s"), Propositions._fields)
-        )
-        yield (
-            tick,
-            [
-                Sighting(car, Pose(*pose), Propositions(*seen))
-                for car, (pose, seen) in enumerate(zip(poses, labels, strict=True))
-            ],
-        )
+        yield tick, [sighted(tick, n, state, labels) for n in range(frames.x.shape[1])]

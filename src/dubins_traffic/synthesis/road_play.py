@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
-from dubins_traffic.cars.state import Pose, Propositions
+from dubins_traffic.cars.state import Labels, Pose, Propositions, State
 from dubins_traffic.rules.propositions import FLAG, renews_ticket
 from dubins_traffic.synthesis.assumption import Forfeits
 from dubins_traffic.synthesis.board import Board
@@ -35,6 +35,13 @@ class Sighting(NamedTuple):
     car: int
     pose: Pose
     propositions: Propositions
+
+
+def sighted(b: int, n: int, state: State, labels: Labels) -> Sighting:
+    """Return car `n` (index) in row `b` (index) of a batch."""
+    pose = Pose(*(float(array[b, n]) for array in (state.x, state.y, state.c, state.s)))
+    seen: Any = [int(array[b, n]) for array in labels]
+    return Sighting(n, pose, Propositions(*seen))
 
 
 class Ground:
@@ -165,6 +172,11 @@ class Sight:
     """Ticks after which it is asked again where unseen cars may be."""
     assume_ego: bool = False
     """Whether a place is assumed for the ego, too, while it is behind another car in its cell."""
+
+    @classmethod
+    def of_all(cls, rate: float) -> Sight:
+        """Return how the road is seen by who has all cars in view, at `rate` frames a second, Hz."""
+        return cls(EVERYWHERE, 0.0, max(1, round(rate)), assume_ego=True)
 
 
 class MoveList:

@@ -20,13 +20,12 @@ from dubins_traffic.record.sink import BY_RULES, BY_STRATEGY, DECIDED, SHIELD
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.shield.filter import ShieldFilter
-from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.foreign.adviser import MachineAdviser
 from dubins_traffic.synthesis.foreign.machine import Machine
 from dubins_traffic.synthesis.foreign.player import check_fit
 from dubins_traffic.synthesis.foreign.read import read_machine
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.instance import assumption_of, cells_of
+from dubins_traffic.synthesis.instance import board_of, cells_of
 from dubins_traffic.synthesis.road_play import RoadPlay, Sight, Sighting
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.strategy import Advice, Adviser, Ranked, Strategy
@@ -252,12 +251,12 @@ def _adviser(strategy: Strategy | Machine | None, problem: Problem, *, fallback:
     if isinstance(strategy, Strategy):
         strategy.check_fit(cells_of(problem), len(problem.e_agents))
         return Ranked(strategy)
-    board = Board(cells_of(problem), assumption_of(problem), len(problem.e_agents))
+    board = board_of(problem)
     check_fit(board, strategy)
     return MachineAdviser(board, strategy, fallback=fallback)
 
 
 def _solved(problem: Problem) -> Strategy:
     """Return the strategy for a problem; if the game is lost it wins nowhere. InputError if the game is too large."""
-    board = Board(cells_of(problem), assumption_of(problem), len(problem.e_agents))
+    board = board_of(problem)
     return Strategy.of(solve(build(board)))
