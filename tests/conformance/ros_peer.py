@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import time
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from math import floor
 from typing import Any
+
+from dubins_traffic.protocols import End, Ending
+from dubins_traffic.transports.clocks import Lockstep
+from tests.conformance.transport import PATIENT, TransportConformance
+from tests.recordings import make_instance
 
 RATE = 30.0
 PATIENCE = 600.0
@@ -96,8 +103,39 @@ class RosPeer:
     def heard(self) -> bool:
         raise NotImplementedError
 
+    def slow_to_hear(self) -> AbstractContextManager[None]:
+        """Keep problems from this peer for a while."""
+        return nullcontext()
+
     def put(self, speed: float, yaw_rate: float) -> None:
         raise NotImplementedError
 
     def fetch(self) -> str | Odometry | None:
         raise NotImplementedError
+
+
+class RosConformance(TransportConformance):
+    """The suite for transports whose peers are told of the ends of trials by an empty problem."""
+
+    tagged = False
+
+    def test_who_is_slow_is_told_of_each_end_though_the_next_trial_begins_at_once(self) -> None:
+        """A peer that missed an end would take the frames of the next trial for those of the one before."""
+        instance = make_instance(names=(), ticks=30)
+        last = replace(instance, problem=replace(instance.problem, intersection_radius=0.75))
+        with self.link(Lockstep(PATIENT), ego=False) as link:
+            transport: Any = link.transport
+            transport.begin(instance, ["ego"])
+            peer = self.connect(transport, "ego")
+            while peer.fetch() is None:
+                transport.announce(instance)
+            with peer.slow_to_hear():
+                for _ in range(4):
+                    transport.announce(instance)
+                    transport.end(Ending(End.DURATION, 30))
+                transport.announce(last)
+            ends = 0
+            while "0.75" not in str(came := peer.next()):
+                ends += came == ""
+            peer.hang_up()
+        assert ends == 4

@@ -1,6 +1,8 @@
 import gc
 import queue
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
@@ -12,8 +14,8 @@ from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import leave
 from dubins_traffic.transports.ros1.transport import Ros1
-from tests.conformance.ros_peer import Odometry, RosPeer
-from tests.conformance.transport import SOON, TransportConformance, answer
+from tests.conformance.ros_peer import Odometry, RosConformance, RosPeer
+from tests.conformance.transport import SOON, answer
 from tests.recordings import make_instance
 from tests.ros import need_ros
 
@@ -71,6 +73,16 @@ class Ros1Peer(RosPeer):
     def heard(self) -> bool:
         return self.commands.get_num_connections() > 0
 
+    @contextmanager
+    def slow_to_hear(self) -> Iterator[None]:
+        """Hold back what rospy's thread writes to this peer's socket."""
+        (queued,) = self.transport._services._problem.impl.connections
+        socket, go = queued._connection, threading.Event()
+        write = socket.write_data
+        socket.write_data = lambda data: go.wait() and write(data)
+        yield
+        go.set()
+
     def put(self, speed: float, yaw_rate: float) -> None:
         twist = load().Twist()
         twist.linear.x, twist.angular.z = speed, yaw_rate
@@ -83,9 +95,7 @@ class Ros1Peer(RosPeer):
             return None
 
 
-class TestRos1(TransportConformance):
-    tagged = False
-
+class TestRos1(RosConformance):
     @pytest.fixture(autouse=True)
     def _at(self, uri: str) -> None:
         self.uri = uri

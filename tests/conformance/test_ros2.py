@@ -10,8 +10,7 @@ from dubins_traffic.sessions.plan import rehearse
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
 from dubins_traffic.transports.ros2.transport import Ros2
-from tests.conformance.ros_peer import Odometry, RosPeer
-from tests.conformance.transport import TransportConformance
+from tests.conformance.ros_peer import Odometry, RosConformance, RosPeer
 from tests.recordings import make_instance
 
 DOMAINS = itertools.count(30 + 20 * (os.getpid() % 10))
@@ -53,9 +52,7 @@ class Ros2Peer(RosPeer):
         return None
 
 
-class TestRos2(TransportConformance):
-    tagged = False
-
+class TestRos2(RosConformance):
     def make(self) -> Ros2:
         return Ros2(next(DOMAINS), clock=True)
 

@@ -22,7 +22,7 @@ from dubins_traffic.transports.maestro import ForeignMaestro, Maestro, Mode
 from dubins_traffic.transports.ros import Stamps, placed
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.node import NAME, REFEREE, Watch, abandon, join, tell_first
-from dubins_traffic.transports.ros1.world import Ros1Publishers, Topics
+from dubins_traffic.transports.ros1.world import QUEUE, Ros1Publishers, Topics
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -72,7 +72,7 @@ class MaestroServices:
         self._set: list[str] = []
         if foreign is None:
             self._problem = rospy.Publisher(
-                PROBLEM, m.ProblemInstanceJSON, queue_size=1, latch=True, tcp_nodelay=True
+                PROBLEM, m.ProblemInstanceJSON, queue_size=QUEUE, latch=True, tcp_nodelay=True
             )
         else:
             self._problem = rospy.Subscriber(PROBLEM, m.ProblemInstanceJSON, self._hear, queue_size=10)
