@@ -38,8 +38,11 @@ def test_rules_gets_past_who_stands_askew_beside_it() -> None:
     ] == []
 
 
-def test_who_keeps_the_law_goes_up_to_the_line_of_a_crossing_that_is_full() -> None:
-    """It waited so far before it that E5 asked it to come on (`crossing_degree` 1)."""
+def test_who_keeps_the_law_is_not_brought_to_a_breach_by_an_ego_that_stands() -> None:
+    """It waited so far before a full crossing that E5 asked it to come on (`crossing_degree` 1).
+
+    Or it had come up to an obstacle beside its way, which it no longer thought of as ahead, and stood there (E4).
+    """
     found = list(outcomes(cases_in(CONTRACT / "provoked"), lambda: AsEgo(Stands())))
     assert [own.file.name for own in found if not own.passed] == []
 

@@ -15,6 +15,7 @@ from dubins_traffic.policies.rules.seeing import (
     leans,
     leans_from,
     leans_past,
+    one_is_ego,
     way_to_go,
 )
 from dubins_traffic.policies.rules.tables import Traffic
@@ -50,7 +51,7 @@ def is_by_disc(b: int, n: int, near: int, traffic: Traffic) -> bool:
     for k in range(near):
         j = traffic.scratch.near[k]
         dx, dy = state.x[b, j] - state.x[b, n], state.y[b, j] - state.y[b, n]
-        if (j == EGO) != (n == EGO) and traffic.labels.lane[b, j] < 0 and dx * dx + dy * dy <= far * far:
+        if one_is_ego(j, n) and traffic.labels.lane[b, j] < 0 and dx * dx + dy * dy <= far * far:
             return True
     return False
 
@@ -108,7 +109,7 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
             if leans(vehicle):
                 edge = min(edge, vehicle.middle - vehicle.over)
             offset = min(offset, edge - clear)
-        elif (j == EGO) != (n == EGO) and leans_past(b, j, left, px, py, traffic.drivers.car[b, n], traffic):
+        elif one_is_ego(j, n) and leans_past(b, j, left, px, py, traffic.drivers.car[b, n], traffic):
             if left >= 0.0:
                 offset = min(offset, left - half - clear)
             elif part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:

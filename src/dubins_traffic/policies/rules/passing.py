@@ -194,7 +194,7 @@ def keep_off(b: int, n: int, p: int, way: ReferencePath, traffic: Traffic) -> No
         part = obstacles.parts[p]
         end = along(way, part.x, part.y) + part.reach - vehicle.reach
         offset = offset_on_way(b, way, own + vehicle.reach, end, obstacles, vehicle)
-    if end >= own and offset != 0.0:
+    if end + 2.0 * vehicle.reach >= own and offset != 0.0:
         drivers.car[b, n].aside = offset
         drivers.car[b, n].until = end + SLIP + 2.0 * vehicle.half_length
 

@@ -170,7 +170,7 @@ def look_ahead(
             continue
         if left > ASTRAY and its_left > wide and comes_past(way, x, y, dx, dy, wide):
             continue
-        if (j == EGO) != (n == EGO) and leans_past(b, j, its_left, px, py, car, traffic):
+        if one_is_ego(j, n) and leans_past(b, j, its_left, px, py, car, traffic):
             continue
         passed = car.aside > 0.0 and labels.bits[b, j] & FLAG.STANDS != 0
         if passed and its_left < car.aside - wide + SIDE:
@@ -218,6 +218,12 @@ def leans_past(b: int, j: int, left: float, px: float, py: float, car: Driver, t
     if left < 0.0:
         return left + kept <= farthest_left(vehicle)
     return left - kept >= EDGE - vehicle.middle
+
+
+@jit_inline
+def one_is_ego(j: int, n: int) -> bool:
+    """Tell whether one of two cars, j and n, is the ego."""
+    return (j == EGO) != (n == EGO)
 
 
 @jit_inline
