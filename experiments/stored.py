@@ -106,6 +106,11 @@ CLAIMS: Mapping[str, Claim] = {
         "learning-agents.md",
         "half an hour",
     ),
+    "excuses": Claim(
+        "how much of what an ego breaks among learners is forgiven, for the rest of an episode and in a window",
+        "learning-agents.md#who-pays-for-what",
+        "two minutes",
+    ),
     "falsify": Claim(
         "an evolution finds planted faults in at most a fifth of the trials that chance needs, and none in the drivers",
         "falsify.md#how-soon",

@@ -57,8 +57,8 @@ class Lesson:
         return tuple(part.reshape(-1, *size) for part, size in zip(parts, sizes, strict=True))
 
 
-COLLISIONS = {"visits": 1.0, "progress": 0.2, "comfort": 0.0, "1.collision": -1.0, "at_fault": -2.0}
-RULES = {**dict.fromkeys(COSTS, -0.5), "visits": 1.0, "progress": 0.3, "comfort": 0.0, "at_fault": -2.0}
+COLLISIONS = {"progress": 0.2, "comfort": 0.0, "1.collision": -1.0, "at_fault": -2.0, "debt": 0.0}
+RULES = {**dict.fromkeys(COSTS, -0.5), "progress": 0.3, "comfort": 0.0, "at_fault": -2.0, "debt": 0.0}
 LESSONS = {
     "district": Lesson(300, 8, (*SHOWN, *OTHERS), COLLISIONS),
     "town": Lesson(260, 12, (*SHOWN, *MORE, *OTHERS), RULES),

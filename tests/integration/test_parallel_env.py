@@ -19,7 +19,7 @@ from dubins_traffic.envs.citing import cited
 from dubins_traffic.envs.parallel import TrafficParallelEnv, parallel_env
 from dubins_traffic.envs.shielded import Shielded, others
 from dubins_traffic.envs.single import TrafficEnv
-from dubins_traffic.envs.terms import PEER
+from dubins_traffic.envs.terms import LEAST, PEER
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
@@ -158,7 +158,7 @@ def test_a_shield_on_one_side_leaves_the_other_alone() -> None:
 
 
 def test_e_agents_are_charged_until_the_ego_has_broken_its_part_and_the_ego_is_excused_after_them() -> None:
-    env = parallel_env(config(cars=5, seconds=30.0))
+    env = parallel_env(config(cars=5, seconds=30.0), reward={"ego": {"debt": 0.0}})
     seen: set[tuple[str, bool]] = set()
     for seed in range(5):
         first = None
@@ -183,9 +183,8 @@ def test_e_agents_are_charged_until_the_ego_has_broken_its_part_and_the_ego_is_e
 
 
 def test_peers_go_round_the_goals_themselves() -> None:
-    env = parallel_env(
-        config(cars=2, seconds=40.0), roles="peers", reward={"others": {"visits": 3.0, "E1": 0.0}}
-    )
+    others = {"visits": 3.0, "E1": 0.0, "debt": 0.0}
+    env = parallel_env(config(cars=2, seconds=40.0), roles="peers", reward={"others": others})
     steps = [step for seed in range(8) for step in driven(env, seed)[1:]]
     own = [step[4]["car_1"]["reward_terms"] for step in steps]
     assert set(own[0]) == set(PEER)
@@ -193,6 +192,34 @@ def test_peers_go_round_the_goals_themselves() -> None:
     assert sum(terms["visits"] for terms in own) > 0.0
     assert all(terms["E1"] == 0.0 for terms in own)
     assert any(step[4]["car_1"]["costs"]["E1"] for step in steps)
+
+
+def test_a_peer_in_debt_earns_less() -> None:
+    """The same episodes, with debts and without."""
+    paid: list[list[float]] = []
+    for debt in (1.0, 0.0):
+        env = parallel_env(
+            config(cars=2, seconds=40.0), roles="peers", reward={"others": {"debt": debt}}, excuses=False
+        )
+        steps = [step for seed in range(4) for step in driven(env, seed)[1:]]
+        paid.append([step[4]["car_1"]["reward_terms"]["progress"] for step in steps])
+    shares = {round(owing / free, 6) for owing, free in zip(*paid, strict=True) if free}
+    assert max(shares) == 1.0
+    assert min(shares) == LEAST
+
+
+def test_what_one_side_breaks_soon_after_the_other_is_forgiven() -> None:
+    """The seconds of breaches that last, too; without excuses each side pays for all."""
+    costs: dict[Any, tuple[float, float]] = {}
+    for excuses in (True, "window", False):
+        env = parallel_env(
+            config(cars=5, seconds=30.0), excuses=excuses, reward={"ego": {"off_road_s": 1.0, "left_s": 1.0}}
+        )
+        infos = [step[4]["ego_0"] for seed in range(5) for step in driven(env, seed)[1:]]
+        lasting = sum(info["reward_terms"][name] for info in infos for name in ("off_road_s", "left_s"))
+        costs[excuses] = sum(info["cost"] for info in infos), lasting
+    for part in (0, 1):
+        assert costs[True][part] < costs["window"][part] < costs[False][part]
 
 
 def test_agents_are_told_where_the_ego_is_and_goes() -> None:

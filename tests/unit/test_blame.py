@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from dubins_traffic.envs.crew import Blame
+import pytest
+
+from dubins_traffic.envs.crew import Blame, Excuses
+from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.rules.referee import Breach
@@ -16,7 +19,7 @@ def breach(rule: str, car: int, tick: int) -> Breach:
 
 
 def counted(
-    breaches: Sequence[Sequence[Breach]], excuses: bool = True, **rules: Any
+    breaches: Sequence[Sequence[Breach]], excuses: Excuses = True, **rules: Any
 ) -> tuple[list[tuple[str, int]], int | None]:
     """Return what counts, part and car, of breaches that come in some calls, and who broke first."""
     document = {
@@ -55,6 +58,24 @@ def test_without_excuses_each_side_answers_for_all_that_it_breaks() -> None:
     both = [[breach("1.road", 0, 5)], [breach("E4", 1, 6)], [breach("2.left", 0, 9)]]
     assert counted(both, excuses=False) == ([("1.road", 0), ("E4", 1), ("2.left", 0)], 0)
     assert counted(both[1:], excuses=False) == ([("E4", 1), ("2.left", 0)], 1)
+
+
+def test_in_a_window_only_what_was_broken_shortly_before_excuses() -> None:
+    """At 30 Hz the second of the window has 30 ticks."""
+    late = [[breach("E4", 1, 5)], [breach("2.left", 0, 35)], [breach("3.stop", 0, 36)]]
+    assert counted(late, excuses="window")[0] == [("E4", 1), ("3.stop", 0)]
+    assert counted(late)[0] == [("E4", 1)]
+    others = [[breach("1.road", 0, 5), breach("E4", 1, 5)], [breach("E4", 2, 6), breach("1.road", 0, 37)]]
+    assert counted(others, excuses="window")[0] == [("E4", 1), ("E4", 2), ("1.road", 0)]
+    assert counted([[breach("1.road", 0, 5)], [breach("E4", 2, 51)]], excuses=1.5)[0] == [
+        ("1.road", 0), ("E4", 2),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("wrong", ["soon", -1.0, float("nan")])
+def test_other_excuses_are_refused(wrong: Any) -> None:
+    with pytest.raises(InputError, match="excuses"):
+        counted([], excuses=wrong)
 
 
 def test_what_is_not_assumed_and_what_is_allowed_cost_nothing() -> None:

@@ -56,7 +56,8 @@ def test_terms_and_costs_are_what_the_score_counts() -> None:
         "end_on_collision": False,
         "e-agents": [{"type": "wander", "count": 9}],
     }
-    env = vector(8, config, frame_skip=4, autoreset_mode=AutoresetMode.DISABLED)
+    reward = dict.fromkeys(TERMS, 1.0) | {"debt": 0.0}
+    env = vector(8, config, frame_skip=4, autoreset_mode=AutoresetMode.DISABLED, reward=reward)
     env.reset(seed=4)
     terms, costs, over, step = (
         np.zeros((len(TERMS), 8)),
@@ -82,6 +83,8 @@ def test_terms_and_costs_are_what_the_score_counts() -> None:
         assert [costs[j, k] for j in range(len(COSTS) - 1)] == [found.get(name, 0) for name in COSTS[:-1]]
         assert costs[-1, k] == sum(own.at_fault for own in score.collisions)
         assert terms[TERMS.index("visits"), k] == sum(goal.visits for goal in score.goals)
+        assert terms[TERMS.index("rounds_before_breach"), k] == pytest.approx(score.rounds_before_breach)
+        assert terms[TERMS.index("off_road_s"), k] == pytest.approx(score.driven.off_road_s)
     assert costs.sum(axis=1)[[0, 1, 2, -1]].all()
     assert terms[TERMS.index("visits")].sum() > 0
 
@@ -90,7 +93,7 @@ def test_weights_count_and_wrong_ones_are_refused() -> None:
     env = single(reward=dict.fromkeys(TERMS, 0.0) | {"time": 2.0}, frame_skip=15)
     env.reset(seed=1)
     assert env.step(weaving(0))[1] == pytest.approx(1.0)
-    for wrong in ({"speed": 1.0}, {"visits": float("nan")}):
+    for wrong in ({"speed": 1.0}, {"visits": float("nan")}, "rounds"):
         with pytest.raises(InputError, match="reward"):
             single(reward=wrong)
 

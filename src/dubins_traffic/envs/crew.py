@@ -6,6 +6,7 @@ then keeps rules 1 to 3 (docs/rules.md). Within a frame the e-agents move first,
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Final
@@ -19,11 +20,11 @@ from dubins_traffic.engine.egos import Egos, Way
 from dubins_traffic.engine.group import Group
 from dubins_traffic.envs.about_ego import NAMES, count_cars, tell_cars
 from dubins_traffic.envs.fleet import Board
-from dubins_traffic.envs.step_kernel import StepTables, Stride, begin_trials
-from dubins_traffic.envs.terms import AT_FAULT, PARTS
+from dubins_traffic.envs.step_kernel import StepTables, begin_trials, early_rounds, strides
+from dubins_traffic.envs.terms import AT_FAULT, PARTS, TERM
+from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.kernels.records import table
 from dubins_traffic.learning.outlook import new_outlook
 from dubins_traffic.observations.viewpoints import Viewpoints
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
@@ -40,33 +41,45 @@ if TYPE_CHECKING:
     from dubins_traffic.envs.settings import Settings
     from dubins_traffic.shield.tables import Overtakes
 
+Bools = npt.NDArray[np.bool_]
+Excuses = bool | str | float
+WINDOW: Final = "window"
+EXCUSED_FOR: Final = 1.0
+"""Seconds for which a breach excuses the other side where `WINDOW` is asked for: it may have brought about so much."""
+
 
 class Blame:
     """Decides for the breaches of one trial, as they come, which count.
 
     - A breach by an e-agent counts if the problem assumes the part of E1 to E6 that it breaks, if it is beyond the
-      exceptions that are allowed, and if the ego has not violated its own part in an earlier frame.
+      exceptions that are allowed, and if no breach by the ego has counted in an earlier frame.
     - A breach by the ego counts if no breach by an e-agent has counted, up to and including its frame.
 
-    All others are excused.
+    All others are excused. With a window only what has counted in so many seconds before excuses.
 
     Parameters
     ----------
-    excuses : bool
-        Whether it matters who broke first; else each side answers for all that it breaks.
+    excuses : bool, str or float
+        Whether what has counted of one side's excuses the other for the rest of the trial; or the window, seconds;
+        `WINDOW` is one of `EXCUSED_FOR`. False: each side answers for all that it breaks.
 
     Attributes
     ----------
     first : int or None
         The car whose breach was the first that counted; None so far.
+
+    Raises
+    ------
+    InputError
+        If `excuses` is none of these.
     """
 
-    def __init__(self, problem: Problem, *, excuses: bool = True) -> None:
-        self._excuses = excuses
+    def __init__(self, problem: Problem, *, excuses: Excuses = True) -> None:
+        self._window = _seconds_excused(excuses) * problem.rate
         rules = RuleParameters.from_mapping(problem.rules)
         self._assumed = assumed(rules)
         self._exceptions = Exceptions(rules, problem.rate)
-        self._since = -1
+        self._last = dict.fromkeys((True, False), -math.inf)
         self.first: int | None = None
 
     def of(self, breaches: Sequence[Breach]) -> list[tuple[Breach, str]]:
@@ -79,21 +92,41 @@ class Blame:
             part = breach.rule if breach.car == EGO else assumption_of(breach.rule)
             if self._counts(breach, part):
                 counted.append((breach, part))
-                if self.first is None:
-                    self.first, self._since = breach.car, breach.tick
+                self._last[breach.car == EGO] = breach.tick
+                self.first = breach.car if self.first is None else self.first
         return counted
+
+    def excused(self, cars: int, tick: int) -> Bools:
+        """Return which of so many cars break nothing that counts in the frame `tick`, (N,)."""
+        return np.array([self._is_excused(tick, ego=car == EGO) for car in range(cars)])
+
+    def _is_excused(self, tick: int, *, ego: bool) -> bool:
+        since = tick - self._last[not ego]
+        soon = self._window > 0.0 and since <= self._window and since < math.inf
+        return soon and since >= (0 if ego else 1)
 
     def _counts(self, breach: Breach, part: str) -> bool:
         if breach.car == EGO:
-            return self.first in (None, EGO) or not self._excuses
+            return not self._is_excused(breach.tick, ego=True)
         allowed = part == "E1" and not self._exceptions.exceeded(breach)
-        excused = self._excuses and self.first == EGO and self._since < breach.tick
-        return part in self._assumed and not allowed and not excused
+        return part in self._assumed and not allowed and not self._is_excused(breach.tick, ego=False)
+
+
+def _seconds_excused(excuses: Excuses) -> float:
+    """Return for how many seconds what one side breaks excuses the other."""
+    if excuses == WINDOW:
+        return EXCUSED_FOR
+    if isinstance(excuses, bool):
+        return math.inf if excuses else 0.0
+    if isinstance(excuses, str) or not excuses >= 0.0:
+        raise InputError(
+            "no excuses", field="excuses", value=excuses, expected=f"True, False, {WINDOW} or seconds"
+        )
+    return excuses
 
 
 LEARNER: Final = "learner/policy"
 """The type of an e-agent that a learner drives."""
-Bools = npt.NDArray[np.bool_]
 
 
 @dataclass
@@ -106,8 +139,8 @@ class Roles:
     """The controller that drives the ego, by its name; None if a learner does."""
     shields: dict[int, Overtakes] = field(default_factory=dict[int, "Overtakes"])
     """Of cars under a shield, by number, when they may cross the centre line."""
-    excuses: bool = True
-    """Whether what one side breaks after the other costs nothing (`Blame`)."""
+    excuses: Excuses = True
+    """Whether what one side breaks after the other costs nothing, or for how many seconds (`Blame`)."""
 
 
 class MultiAgentTrials:
@@ -148,7 +181,7 @@ class MultiAgentTrials:
         around = self._views.state, self._views.labels, *bodies
         self.outlook = new_outlook(each, nets, self.group.world.roads, around, settings.layout.cars)
         board: dict[str, Any] = Board(len(each), settings).arrays
-        self._steps = StepTables(stride=table(Stride, len(each)), **board)
+        self._steps = StepTables(stride=strides(each), **board)
         self._flat, self._told = board["flat"], np.zeros((len(each), len(NAMES)), dtype=np.float32)
         self.broken: Ints = np.zeros((trials, places, len(PARTS)), dtype=np.int64)
         self.stepped_in: Ints = np.zeros((trials, places), dtype=np.int64)
@@ -198,15 +231,25 @@ class MultiAgentTrials:
             ticks: Ints = np.full(len(group.instances), -1)
             ticks[running] = group.ticks[running]
             self.stepped_in += shields.filter(ticks, commands) != 0
-        before = group.ticks.copy()
+        before, early = group.ticks.copy(), self._early()
         group.advance()
         self.given.append(commands.copy())
         moved: Ints = np.flatnonzero(group.ticks > before)
         if not len(moved):
             return
         self._views.look(moved)
+        lasting: Floats = self.terms[..., TERM.OFF_ROAD : TERM.BREACHES].copy()
         self._count(self._rows(moved), int(group.ticks[moved[0]]), self.outlook, self._steps)
+        self.terms[:, EGO, TERM.EARLY] += self._early() - early
         self._charge(moved)
+        for b in map(int, moved):
+            excused = self.blame[b].excused(self.terms.shape[1], int(group.ticks[b]))
+            self.terms[b, excused, TERM.OFF_ROAD : TERM.BREACHES] = lasting[b, excused]
+
+    def _early(self) -> Floats:
+        """Return the rounds of each trial before the ego's first breach so far, (B,)."""
+        tally = self.group.world.tally
+        return np.array([early_rounds(b, tally) for b in range(len(self.group.instances))])
 
     def _rows(self, trials: Ints) -> Ints:
         places = self.group.state.x.shape[1]

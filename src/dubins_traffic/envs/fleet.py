@@ -22,6 +22,7 @@ from dubins_traffic.envs.step_kernel import (
     begin_trials,
     observe_trials,
     step_trials,
+    strides,
 )
 from dubins_traffic.envs.terms import costs_of_rules
 from dubins_traffic.errors import DubinsTrafficError, InputError
@@ -67,6 +68,7 @@ class Board:
             "terms": np.zeros((envs, len(weights))),
             "weighted": np.zeros((envs, len(weights))),
             "weights": weights,
+            "debts": settings.debts,
             "cost_of": costs_of_rules(),
             "reward": np.zeros(envs),
             "status": np.zeros(envs, dtype=np.int64),
@@ -105,7 +107,7 @@ class Bank:
         nets: Ints = np.ascontiguousarray(world.rules["net"])
         around = world.state, world.labels, world.cars, world.obstacles
         self.outlook = new_outlook(problems, nets, world.roads, around, shown)
-        self.steps = StepTables(stride=table(Stride, len(instances)), **board.arrays)
+        self.steps = StepTables(stride=strides(problems), **board.arrays)
         self._step, self._observe = bound(step_trials), bound(observe_trials)
         self.watches: dict[int, FormulaWatch] = {}
         self.between: dict[int, EgoChannel] = {}

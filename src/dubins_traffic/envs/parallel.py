@@ -13,7 +13,7 @@ from pettingzoo import ParallelEnv  # pyright: ignore[reportMissingTypeStubs]
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import MultiAgentTrials, Roles
+from dubins_traffic.envs.crew import Excuses, MultiAgentTrials, Roles
 from dubins_traffic.envs.pictures import SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import Pay
@@ -55,8 +55,9 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         says, and keep the rules.
     reward : mapping, optional
         Weights of terms that are not as usual: under ``ego`` those of the ego, under ``others`` those of e-agents.
-    excuses : bool
-        Whether what one side breaks after the other costs nothing; else each answers for all that it breaks.
+    excuses : bool, str or float
+        Whether what one side breaks after the other costs nothing; else each answers for all that it breaks. ``window``
+        or seconds: only what it breaks so soon after the other (`envs.crew.Blame`).
     action, frame_skip, cars, levels
         As in `envs.settings.Settings`.
     render_mode : str, optional
@@ -85,7 +86,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         ego: str | None = None,
         learned: Sequence[str] | None = None,
         reward: Mapping[str, Mapping[str, float]] | None = None,
-        excuses: bool = True,
+        excuses: Excuses = True,
         action: str = "continuous",
         frame_skip: int = 1,
         cars: int = SHOWN,
@@ -169,6 +170,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
             )
         self._episode += 1
         self._crew = MultiAgentTrials([instance], self._roles, self.settings)
+        self._pay.begin()
         self.agents = list(self.possible_agents)
         return self._observed(), {name: {"trial": instance} for name in self.agents}
 

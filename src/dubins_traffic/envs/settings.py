@@ -116,8 +116,8 @@ class Settings:
     """``continuous`` or ``discrete``."""
     frame_skip: int = 1
     """Ticks of a step, for which its command is held."""
-    reward: Mapping[str, float] | None = None
-    """Weights of terms by name, where they are not those of `envs.terms.WEIGHTS`."""
+    reward: Mapping[str, float] | str | None = None
+    """Weights of terms by name, where they are not those of `envs.terms.WEIGHTS`; or `envs.terms.SCORE`."""
     cars: int = SHOWN
     """Other cars that a flat observation shows, at most."""
     levels: Levels | Mapping[str, Any] | int | None = None
@@ -129,6 +129,7 @@ class Settings:
     episodes: Episodes = field(init=False)
     actions: ActionMap = field(init=False)
     weights: Floats = field(init=False)
+    debts: Floats = field(init=False)
     sample: Instance = field(init=False)
     layout: Layout = field(init=False)
 
@@ -150,10 +151,12 @@ class Settings:
             )
         if self.formulas:
             with_formulas(sample, self.formulas)
+        weights, debts = weights_of(self.reward)
         parts = {
             "episodes": episodes,
             "actions": ActionMap(self.action, sample.problem.car.bounds),
-            "weights": weights_of(self.reward),
+            "weights": weights,
+            "debts": debts,
             "sample": sample,
             "layout": Layout.of(sample.problem, self.cars),
         }

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.engine.batch_kernel import STATUS, World, run_trials
-from dubins_traffic.envs.terms import AT_FAULT, TERM
+from dubins_traffic.envs.terms import AT_FAULT, TERM, worth
 from dubins_traffic.kernels.arrays import INFINITE, Floats, Ints, fetch
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_wide
-from dubins_traffic.kernels.records import Rows, record
+from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.learning.flat_kernel import sweep, within, write_flat
 from dubins_traffic.learning.outlook import OutlookTables
@@ -21,10 +23,15 @@ from dubins_traffic.learning.seeking import metres_to_goal, seek
 from dubins_traffic.rules.breach_log import RULE
 from dubins_traffic.rules.fault import blamed, in_breach
 from dubins_traffic.rules.label_cache import growth_row
+from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.scoring.tally import Tally
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Sequence
+
     import numpy.typing as npt
+
+    from dubins_traffic.problem.instance import Problem
 
 
 @record
@@ -39,6 +46,19 @@ class Stride:
     """The same, rad/s."""
     route: float
     """How far the ego had to go to the goal that it seeks, in the frame before, metres."""
+    debt: float
+    """What the ego's breaches before this step have added up to (`envs.terms.DEBTS`)."""
+    owed: float
+    """What those of this step add to it."""
+    judged: int
+    """1 if the rules are judged in the trial."""
+
+
+def strides(problems: Sequence[Problem]) -> Rows[Stride]:
+    """Return the strides of trials that have not begun."""
+    stride = table(Stride, len(problems))
+    stride["judged"] = [bool(problem.rules) for problem in problems]
+    return stride
 
 
 @record
@@ -76,6 +96,8 @@ class StepTables(Tables):
         The same, with weights.
     weights : (T,)
         Their weights.
+    debts : (T,)
+        What a unit of each adds to the debt.
     cost_of : (R,)
         The cost that each rule is (`envs.terms.costs_of_rules`).
     reward : (E,)
@@ -94,6 +116,7 @@ class StepTables(Tables):
     terms: Floats
     weighted: Floats
     weights: Floats
+    debts: Floats
     cost_of: Ints
     reward: Floats
     status: Ints
@@ -217,7 +240,9 @@ def _begin(rows: Ints, envs: Ints, ticks: int, commands: Floats, steps: StepTabl
         e: int = envs[k]
         commands[b, EGO, 0] = within(steps.asked[e, 0]) * scale.speed + scale.middle
         commands[b, EGO, 1] = within(steps.asked[e, 1]) * scale.yaw_rate
-        steps.stride[b].left = ticks
+        stride = steps.stride[b]
+        stride.left = ticks
+        stride.debt += stride.owed
         for j in range(steps.terms.shape[1]):
             steps.terms[e, j] = 0.0
     return True
@@ -228,11 +253,12 @@ def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables
     """Step trial b by a tick and count its results; return its status, which says why it can't go on, if so."""
     period = steps.scale[0].period
     breaches, contacts = world.breach_log.filled[0], world.work.found[0]
-    tick = world.progress.trial[b].tick
+    tick, early = world.progress.trial[b].tick, early_rounds(b, world.tally)
     run_trials(steps.one, 1, period, commands, world)
     if world.progress.trial[b].tick > tick:
         steps.stride[b].left -= 1
         count_tick(b, e, outlook, steps)
+        steps.terms[e, TERM.EARLY] += early_rounds(b, world.tally) - early
         _charge(e, breaches, contacts, world, steps)
         sweep(b, tick + 1, outlook)
     return world.progress.trial[b].status
@@ -241,11 +267,14 @@ def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables
 @jit_inline
 def _close(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
     """Compute the reward of a step, and observe."""
-    total = 0.0
+    stride, total, owed = steps.stride[b], 0.0, 0.0
+    share = worth(stride.debt)
     for j in range(steps.weights.shape[0]):
-        weighted = steps.weights[j] * steps.terms[e, j]
+        weighted = steps.weights[j] * steps.terms[e, j] * (share if j <= TERM.PROGRESS else 1.0)
         steps.weighted[e, j] = weighted
         total += weighted
+        owed += steps.debts[j] * steps.terms[e, j]
+    stride.owed = owed
     steps.reward[e] = total
     write_flat(b, EGO, steps.flat[e], outlook)
 
@@ -272,6 +301,24 @@ def count_tick(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> Non
     steps.terms[e, TERM.COMFORT] += faster * faster + turned * turned
     stride.speed, stride.yaw_rate = speed, yaw_rate
     steps.terms[e, TERM.TIME] += steps.scale[0].period
+    if stride.judged != 0:
+        _count_breaches_that_last(e, np.int64(outlook.labels.bits[b, EGO]), steps)
+
+
+@jit_inline
+def _count_breaches_that_last(e: int, bits: Any, steps: StepTables) -> None:
+    """Count a tick that ends off the road, over the line without overtaking, in a disc entered against rule 3."""
+    period = steps.scale[0].period
+    steps.terms[e, TERM.OFF_ROAD] += period if bits & FLAG.ON_ROAD == 0 else 0.0
+    steps.terms[e, TERM.LEFT] += period if bits & (FLAG.LEFT | FLAG.OVERTAKING) == FLAG.LEFT else 0.0
+    steps.terms[e, TERM.CROSSING] += period if bits & FLAG.BREACH3 != 0 else 0.0
+
+
+@jit_inline
+def early_rounds(b: int, tally: Tally) -> float:
+    """Return the rounds of trial b before the ego's first breach so far (docs/rules.md#before-breach)."""
+    own, early = tally.trial[b], tally.early[b]
+    return early.rounds + early.goals / max(1, own.last_goal - own.first_goal)
 
 
 @jit_inline

@@ -14,6 +14,7 @@ import numpy as np
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
+from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.rules import breach_log
 from dubins_traffic.rules.breach_log import RULE, RULES
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES
@@ -35,13 +36,24 @@ class _Term(NamedTuple):
     PROGRESS: int = 2
     COMFORT: int = 3
     TIME: int = 4
-    BREACHES: int = 5
+    EARLY: int = 5
+    """Rounds before the first breach."""
+    OFF_ROAD: int = 6
+    """The first of the three terms of breaches that last."""
+    LEFT: int = 7
+    CROSSING: int = 8
+    BREACHES: int = 9
     """The first of the terms that are costs."""
 
 
 TERM: Final = _Term()
-TERMS: Final = ("visits", "rounds", "progress", "comfort", "time", *COSTS)
+TERMS: Final = (
+    "visits", "rounds", "progress", "comfort", "time", "rounds_before_breach", "off_road_s", "left_s", "crossing_s",
+    *COSTS,
+)  # fmt: skip
 """Terms of the reward, by number."""
+LASTING: Final = TERMS[TERM.OFF_ROAD : TERM.BREACHES]
+"""Those of breaches that last, seconds."""
 
 WEIGHTS: Final[Mapping[str, float]] = {
     "visits": 1.0,
@@ -49,15 +61,40 @@ WEIGHTS: Final[Mapping[str, float]] = {
     "progress": 0.1,
     "comfort": -0.01,
     "time": 0.0,
-    **dict.fromkeys(COSTS, -1.0),
-    "at_fault": -5.0,
+    "rounds_before_breach": 0.0,
+    **dict.fromkeys((*LASTING, *COSTS), 0.0),
 }
 """Default weights of the terms.
 
 `visits` of goals; `rounds` through all of them; `progress` toward the goal that is sought, metres along lanes;
 `comfort`: sum over ticks of the squared changes of speed and yaw rate, as shares of the car's bounds; `time`, seconds;
-the ego's breaches by rule (rule 1's collisions whoever is at fault); `at_fault`: collisions in which it is at fault.
+`rounds_before_breach`: the rounds that a ranking counts before the ego's first breach; seconds off the road
+(`off_road_s`), over the centre line without overtaking (`left_s`) and in a disc entered against rule 3 (`crossing_s`),
+where the rules are judged; the ego's breaches by rule (rule 1's collisions whoever is at fault); `at_fault`: collisions
+in which it is at fault.
 """
+DEBT: Final = "debt"
+"""The name under which a reward has the weight of `DEBTS`, 1 unless said otherwise."""
+DEBTS: Final[Mapping[str, float]] = {
+    **dict.fromkeys(LASTING, 0.2),
+    **dict.fromkeys(COSTS, 1.0),
+    RULES[RULE.COLLISION]: 0.0,
+    "at_fault": 7.0,
+}
+"""What a unit of each term adds to the debt of a car: visits, rounds and progress are worth `worth` of it from then on.
+
+So a breach never leaves a car with less than one has that stands still, and always with less than without it.
+"""
+LEAST: Final = 0.125
+"""What they are worth at least."""
+EARNED: Final = range(TERM.VISITS, TERM.PROGRESS + 1)
+"""The terms of which that holds: visits, rounds and progress."""
+
+
+@jit_inline
+def worth(debt: float) -> float:
+    """Return what the terms `EARNED` are worth with a `debt` (ratio), 1 to `LEAST`."""
+    return max(LEAST, 1.0 / (1.0 + debt))
 
 
 def cost_of(costs: Floats) -> Floats:
@@ -70,9 +107,24 @@ def costs_of_rules() -> Ints:
     return np.array([EGO_RULES.index(rule) if rule in EGO_RULES else -1 for rule in breach_log.RULES])
 
 
-def weights_of(given: Mapping[str, float] | None) -> Floats:
-    """Return the weight of each term of the ego's, (T,), where `given` names those that are not as in `WEIGHTS`."""
-    return np.array(list(_weighted(WEIGHTS, given or {}, "reward").values()))
+SCORE: Final = "score"
+"""The reward that sums to the rounds before the first breach of an episode, and has no other term."""
+
+
+def weights_of(given: Mapping[str, float] | str | None) -> tuple[Floats, Floats]:
+    """Return the weight of each term of the ego's, and its debts, each (T,).
+
+    `given` names the weights that are not as in `WEIGHTS`, or is `SCORE`. InputError if it is anything else.
+    """
+    if given == SCORE:
+        given = dict.fromkeys((*TERMS, DEBT), 0.0) | {TERMS[TERM.EARLY]: 1.0}
+    if isinstance(given, str):
+        raise InputError(
+            "no such reward", field="reward", value=given, expected=f"{SCORE}, or weights by term"
+        )
+    weights = _weighted({**WEIGHTS, DEBT: 1.0}, given or {}, "reward")
+    debts = [weights[DEBT] * DEBTS.get(name, 0.0) for name in TERMS]
+    return np.array([weights[name] for name in TERMS]), np.array(debts)
 
 
 def _weighted(usual: Mapping[str, float], given: Mapping[str, float], field: str) -> dict[str, float]:
@@ -92,22 +144,28 @@ ADVERSARY: Final[Mapping[str, float]] = {
     "violated": 1.0,
     "comfort": 0.0,
     "time": 0.0,
+    **dict.fromkeys(LASTING, -0.1),
     **dict.fromkeys(ASSUMPTIONS, -1.0),
     "E2": -5.0,
 }
 """Default weights of the terms of an adversary's reward.
 
-`spoiled`: what the ego's visits, rounds and progress count for it, with the sign turned; `violated`: breaches of the
-ego's that count; and its own breaches that count, by the part of the assumption.
+`spoiled`: what the ego's visits, rounds and progress count without debts, with the sign turned; `violated`: breaches of
+the ego's that count; and its own breaches that count, by the part of the assumption.
 """
 PEER: Final[Mapping[str, float]] = {
-    **{name: WEIGHTS[name] for name in TERMS[: TERM.BREACHES]},
-    **dict.fromkeys(ASSUMPTIONS, -1.0),
-    "E2": -5.0,
+    **{name: WEIGHTS[name] for name in (*TERMS[: TERM.EARLY], *LASTING)},
+    **dict.fromkeys(ASSUMPTIONS, 0.0),
 }
 """Default weights of the terms of a peer's reward; a peer goes round the goals as the ego does."""
 ROLES: Final[Mapping[str, Mapping[str, float]]] = {"adversaries": ADVERSARY, "peers": PEER}
 """The roles of e-agents."""
+PEERS_DEBTS: Final[Mapping[str, float]] = {
+    **dict.fromkeys(LASTING, 0.2),
+    **dict.fromkeys(ASSUMPTIONS, 1.0),
+    "E2": 7.0,
+}
+"""What a unit of each term, or a breach of its part of the assumption, adds to the debt of a peer."""
 _FIRST: Final = len(COSTS)
 """The first of `PARTS` that an e-agent may break."""
 
@@ -130,12 +188,21 @@ class Pay:
         unknown = given.keys() - {"ego", "others"}
         if unknown:
             raise InputError("not rewards", field="reward", value=sorted(unknown)[0], expected="ego, others")
-        self._ego = weights_of(given.get("ego"))
-        self._others = _weighted(ROLES[role], given.get("others", {}), "reward.others")
+        self._ego, self._debts = weights_of(given.get("ego"))
         self._spoils = role == "adversaries"
+        usual = ROLES[role] if self._spoils else {**ROLES[role], DEBT: 1.0}
+        self._others = _weighted(usual, given.get("others", {}), "reward.others")
+        self._owed = self._others.pop(DEBT, 0.0)
+        self.begin()
+
+    def begin(self) -> None:
+        """Begin a trial: nobody has a debt."""
+        self._debt: dict[int, float] = {}
 
     def of(self, terms: Floats, broken: Ints, car: int) -> tuple[float, dict[str, Any]]:
         """Return the reward of a car in the last step of its trial, and what it says of it: its terms, and costs.
+
+        Call it once a step for each car.
 
         Parameters
         ----------
@@ -144,19 +211,25 @@ class Pay:
         broken : (N, P)
             How often each car has broken each of `PARTS`, where that counts.
         """
+        debt = self._debt.get(car, 0.0)
+        share = worth(debt)
         if car == EGO:
             costly: Floats = broken[EGO, :_FIRST].astype(np.float64)
             of_ego = np.concatenate([terms[EGO, : TERM.BREACHES], costly])
+            self._debt[car] = debt + float(of_ego @ self._debts)
+            of_ego[: TERM.PROGRESS + 1] *= share
             weighted: list[float] = (of_ego * self._ego).tolist()
             told = {"reward_terms": dict(zip(TERMS, weighted, strict=True)), "cost": float(cost_of(costly))}
             return sum(weighted), told | {"costs": dict(zip(COSTS, costly.tolist(), strict=True))}
         parts = dict(zip(ASSUMPTIONS, map(float, broken[car, _FIRST:]), strict=True))
-        done: dict[str, float] = dict(
-            zip(TERMS[: TERM.BREACHES], terms[car, : TERM.BREACHES].tolist(), strict=True)
+        done = dict(zip(TERMS[: TERM.BREACHES], terms[car, : TERM.BREACHES].tolist(), strict=True))
+        self._debt[car] = debt + self._owed * sum(
+            each * {**done, **parts}[name] for name, each in PEERS_DEBTS.items()
         )
+        for k in EARNED:
+            done[TERMS[k]] *= share
         if self._spoils:
-            task = (TERM.VISITS, TERM.ROUNDS, TERM.PROGRESS)
-            done["spoiled"] = -float(sum(terms[EGO, k] * self._ego[k] for k in task))
+            done["spoiled"] = -float(sum(terms[EGO, k] * self._ego[k] for k in EARNED))
             done["violated"] = float(broken[EGO, :AT_FAULT].sum())
         terms_of_car = {name: weight * {**done, **parts}[name] for name, weight in self._others.items()}
         told = {"reward_terms": terms_of_car, "cost": sum(parts.values()), "costs": parts}
