@@ -19,7 +19,7 @@ from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.learning.flat_kernel import sweep, within, write_flat
 from dubins_traffic.learning.outlook import OutlookTables
-from dubins_traffic.learning.seeking import metres_to_goal, seek
+from dubins_traffic.learning.seeking import look, metres_to_goal
 from dubins_traffic.rules.breach_log import RULE
 from dubins_traffic.rules.fault import blamed, in_breach
 from dubins_traffic.rules.label_cache import growth_row
@@ -132,7 +132,7 @@ _in_breach = jit_inline(in_breach)
 def begin_trials(outlook: OutlookTables, steps: StepTables) -> None:
     """Prepare the first frame of every trial of a bank: goals visited, goals sought, the laser's scan."""
     for b in range(outlook.trial.shape[0]):
-        seek(b, outlook)
+        look(b, outlook)
         sweep(b, 0, outlook)
         stride = steps.stride[b]
         stride.route = _route(b, outlook)
@@ -292,7 +292,7 @@ def count_tick(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> Non
         left = 0.0 if there else metres_to_goal(b, EGO, sought, outlook)
     if stride.route < INFINITE and left < INFINITE:
         steps.terms[e, TERM.PROGRESS] += stride.route - left
-    visited = seek(b, outlook)
+    visited = look(b, outlook)
     steps.terms[e, TERM.VISITS] += visited
     steps.terms[e, TERM.ROUNDS] += seen.rounds - rounds
     stride.route = _route(b, outlook) if visited != 0 or seen.target != sought else left

@@ -6,6 +6,8 @@ The vector has these parts, one after another (`Layout`); docs/learning.md says 
 - ``lane``: where it is on its lane.
 - ``crossing``: the next crossing.
 - ``goal``: the goal that it seeks, and the way there.
+- ``clocks``: for how long it has stood, waited for its turn and been left, and when it forfeits its turn.
+- ``obstacles``: the nearest parts of obstacles that it sees, nearest first; zeros where there are fewer.
 - ``cars``: the nearest other cars that it sees, nearest first, each with its propositions; zeros where there are fewer.
 - ``laser``: ranges, where there is a laser.
 """
@@ -23,8 +25,8 @@ from dubins_traffic.cars.state import EGO, Labels, Observation, State, put_obser
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.learning.flat_kernel import SIZE, write_flat
-from dubins_traffic.learning.outlook import new_outlook
-from dubins_traffic.learning.seeking import seek
+from dubins_traffic.learning.outlook import OBSTACLES, new_outlook
+from dubins_traffic.learning.seeking import look
 from dubins_traffic.roads.table import pack
 from dubins_traffic.rules.propositions import NAMES
 
@@ -38,6 +40,8 @@ _OWN = ("speed", "yaw_rate", *_FLAGS)
 _LANE = ("on_lane", "offset", "heading_cos", "heading_sin", "progress", "to_end")
 _CROSSING = ("x", "y", "roads", "crosses", "at", "is_goal")
 _GOAL = ("sought", "bearing_cos", "bearing_sin", "distance", "route", "turn_cos", "turn_sin", "to_do")
+_CLOCKS = ("standing", "waiting", "forfeit", "left")
+_OBSTACLE = ("seen", "x", "y", "reach")
 _CAR = (
     "seen",
     "x",
@@ -80,6 +84,8 @@ class Layout:
             "lane": SIZE.LANE,
             "crossing": SIZE.CROSSING,
             "goal": SIZE.GOAL,
+            "clocks": SIZE.CLOCKS,
+            "obstacles": SIZE.OBSTACLE * OBSTACLES,
             "cars": SIZE.CAR * self.cars,
             "laser": self.rays,
         }
@@ -89,13 +95,20 @@ class Layout:
     @property
     def size(self) -> int:
         """Length of the vector, F."""
-        return SIZE.OWN + SIZE.LANE + SIZE.CROSSING + SIZE.GOAL + SIZE.CAR * self.cars + self.rays
+        return max(part.stop for part in self.parts.values())
 
     @property
     def names(self) -> tuple[str, ...]:
         """A name for each number, as ``lane.offset`` or ``cars[0].speed``."""
-        fixed = (("own", _OWN), ("lane", _LANE), ("crossing", _CROSSING), ("goal", _GOAL))
+        fixed = (
+            ("own", _OWN),
+            ("lane", _LANE),
+            ("crossing", _CROSSING),
+            ("goal", _GOAL),
+            ("clocks", _CLOCKS),
+        )
         names = [f"{part}.{name}" for part, own in fixed for name in own]
+        names += [f"obstacles[{k}].{name}" for k in range(OBSTACLES) for name in _OBSTACLE]
         names += [f"cars[{k}].{name}" for k in range(self.cars) for name in _CAR]
         return (*names, *(f"laser[{k}]" for k in range(self.rays)))
 
@@ -135,14 +148,14 @@ class FlatObserver:
         nets = np.zeros(1, dtype=np.int64)
         self._tables = new_outlook([problem], nets, roads, around, cars)
         self._tables.trial[0].sight2 = np.inf
-        self._seek, self._write = bound(seek), bound(write_flat)
+        self._look, self._write = bound(look), bound(write_flat)
 
     def __call__(self, observation: Observation) -> npt.NDArray[np.float32]:
         """Return the vector of an observation, (F,)."""
         put_observed(self._state, self._labels, observation)
         if observation.scan is not None:
             self._tables.ranges[0] = observation.scan
-        self._seek(0, self._tables)
+        self._look(0, self._tables)
         out = np.empty(self.layout.size, dtype=np.float32)
         self._write(0, EGO, out, self._tables)
         return out

@@ -10,8 +10,10 @@ import numpy.typing as npt
 
 from dubins_traffic.cars.sensing import scan, within_sight
 from dubins_traffic.cars.state import EGO
+from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.learning.outlook import Outlook, OutlookTables
+from dubins_traffic.learning.clocks import write_clocks
+from dubins_traffic.learning.outlook import OBSTACLES, Outlook, OutlookTables
 from dubins_traffic.learning.seeking import lane_of, metres_to_goal, next_lane
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.routing.lane_graph import foot, frame
@@ -28,6 +30,9 @@ class _Size(NamedTuple):
     CROSSING: int = 6
     """The next one."""
     GOAL: int = 8
+    CLOCKS: int = 4
+    OBSTACLE: int = 4
+    """Each part of an obstacle."""
     CAR: int = 27
     """Each other car, with its flags."""
 
@@ -78,6 +83,8 @@ def write_flat(b: int, n: int, out: npt.NDArray[np.float32], tables: OutlookTabl
     _crossing(b, n, ahead, out, tables)
     _goal(b, n, own, out, tables)
     place = SIZE.OWN + SIZE.LANE + SIZE.CROSSING + SIZE.GOAL
+    write_clocks(tables.clock[b], out[place : place + SIZE.CLOCKS])
+    place = _obstacles(b, n, place + SIZE.CLOCKS, own, out, tables)
     shown = (out.shape[0] - place - tables.rays.shape[0]) // SIZE.CAR
     count = _nearest(b, n, shown, own.sight2, tables)
     for k in range(shown):
@@ -158,6 +165,46 @@ def _goal(b: int, n: int, own: Outlook, out: npt.NDArray[np.float32], tables: Ou
 
 
 @jit
+def _obstacles(
+    b: int, n: int, place: int, own: Outlook, out: npt.NDArray[np.float32], tables: OutlookTables
+) -> int:
+    """Write the nearest parts of obstacles within sight of car n from `place` on; return where the next part begins."""
+    obstacles, state, near, apart = tables.around.obstacles, tables.state, tables.near, tables.apart
+    x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
+    count = 0
+    for p in range(obstacles.off[b], obstacles.off[b + 1]):
+        dx, dy = obstacles.parts[p].x - x, obstacles.parts[p].y - y
+        d2 = dx * dx + dy * dy
+        if d2 <= own.sight * own.sight and (count < OBSTACLES or d2 < apart[count - 1]):
+            count = put_in_order(p, d2, count, OBSTACLES, near, apart)
+    for k in range(OBSTACLES):
+        at = place + k * SIZE.OBSTACLE
+        for j in range(SIZE.OBSTACLE):
+            out[at + j] = 0.0
+        if k < count:
+            part = obstacles.parts[int(near[k])]
+            dx, dy = part.x - x, part.y - y
+            out[at] = 1.0
+            out[at + 1] = within((c * dx + s * dy) / own.sight)
+            out[at + 2] = within((c * dy - s * dx) / own.sight)
+            out[at + 3] = within(part.reach / own.half_width)
+    return place + OBSTACLES * SIZE.OBSTACLE
+
+
+@jit_inline
+def put_in_order(which: int, d2: float, count: int, most: int, near: Ints, apart: Floats) -> int:
+    """Put `which` at the squared distance `d2` into a list of the `count` nearest, `most` of them; return how many."""
+    place = min(count, most - 1)
+    while place > 0 and apart[place - 1] > d2:
+        near[place] = near[place - 1]
+        apart[place] = apart[place - 1]
+        place -= 1
+    near[place] = which
+    apart[place] = d2
+    return min(count + 1, most)
+
+
+@jit
 def _nearest(b: int, n: int, shown: int, sight2: float, tables: OutlookTables) -> int:
     """List the nearest cars that car n sees in `tables.near`, of equally near ones the lower index first."""
     state, near, apart = tables.state, tables.near, tables.apart
@@ -168,14 +215,7 @@ def _nearest(b: int, n: int, shown: int, sight2: float, tables: OutlookTables) -
         dx, dy = state.x[b, other] - state.x[b, n], state.y[b, other] - state.y[b, n]
         d2 = dx * dx + dy * dy
         if other != n and within_sight(dx, dy, sight2) and (count < shown or d2 < apart[count - 1]):
-            place = min(count, shown - 1)
-            while place > 0 and apart[place - 1] > d2:
-                near[place] = near[place - 1]
-                apart[place] = apart[place - 1]
-                place -= 1
-            near[place] = other
-            apart[place] = d2
-            count = min(count + 1, shown)
+            count = put_in_order(other, d2, count, shown, near, apart)
     return count
 
 

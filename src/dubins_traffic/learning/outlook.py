@@ -13,12 +13,16 @@ from dubins_traffic.cars.tables import CarTable, ObstacleTable
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
+from dubins_traffic.learning.clocks import Clock, clocks
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.tours import lane_graph
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
+
+OBSTACLES = 3
+"""Parts of obstacles that a flat observation shows."""
 
 
 @record
@@ -96,6 +100,8 @@ class OutlookTables(Tables):
         The roads of the batch.
     trial : (B,) Outlook
         Scales of each trial, and the goal that its ego seeks.
+    clock : (B,) Clock
+        For how long its ego has stood, waited, been first, been left.
     goal : (G,) SoughtGoal
         The goals of one trial after another, each once.
     done : (G,)
@@ -103,7 +109,7 @@ class OutlookTables(Tables):
     metres : (M, L)
         Distance from the start of each lane to a goal, for each distinct pair of network and goal; inf for no way.
     near : (K,)
-        Scratch: the cars that are shown, nearest first.
+        Scratch: the cars that are shown, then the obstacles, nearest first.
     apart : (K,)
         Scratch: their squared distances, square metres.
     laser : (1,) Sweeps
@@ -120,6 +126,7 @@ class OutlookTables(Tables):
     labels: Labels
     roads: RoadTable
     trial: Rows[Outlook]
+    clock: Rows[Clock]
     goal: Rows[SoughtGoal]
     done: Ints
     metres: Floats
@@ -163,9 +170,9 @@ def new_outlook(
     goal, metres = _goals(problems, trial)
     laser, rays = _laser(problems[0])
     return OutlookTables(
-        state=state, labels=labels, roads=roads, trial=trial, goal=goal,
+        state=state, labels=labels, roads=roads, trial=trial, clock=clocks(problems), goal=goal,
         done=np.zeros(len(goal), dtype=np.int64), metres=metres,
-        near=np.zeros(max(1, shown), dtype=np.int64), apart=np.zeros(max(1, shown)),
+        near=np.zeros(max(OBSTACLES, shown), dtype=np.int64), apart=np.zeros(max(OBSTACLES, shown)),
         laser=laser, rays=rays, ranges=np.full((len(problems), len(rays)), np.inf),
         around=Surroundings(state, cars, obstacles),
     )  # fmt: skip

@@ -11,6 +11,7 @@ from math import sqrt
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.learning.clocks import keep_time
 from dubins_traffic.learning.outlook import OutlookTables
 from dubins_traffic.roads.lookup import lane_direction_at, lane_end
 from dubins_traffic.routing.lane_graph import foot, frame
@@ -89,8 +90,15 @@ def next_lane(b: int, n: int, row: int, tables: OutlookTables) -> int:
 
 
 @jit
+def look(b: int, tables: OutlookTables) -> int:
+    """Keep the time of trial b, and `seek` its goals; return how many are visited. Call it once per labelled frame."""
+    keep_time(b, tables.clock[b], tables.state, tables.labels)
+    return seek(b, tables)
+
+
+@jit_inline
 def seek(b: int, tables: OutlookTables) -> int:
-    """Note the goals that the ego of trial b visits in a labelled frame; return how many. Call it once per frame.
+    """Note the goals that the ego of trial b visits in a labelled frame; return how many.
 
     If it has visited the goal that it seeks, or seeks none, it seeks the nearest goal of its round from here on.
     """
