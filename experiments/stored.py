@@ -111,6 +111,11 @@ CLAIMS: Mapping[str, Claim] = {
         "learning-agents.md#who-pays-for-what",
         "two minutes",
     ),
+    "cloning": Claim(
+        "a policy cloned from `rules` makes counted rounds, and under the shield as many as `rules`",
+        "learning.md#a-policy-that-is-taught",
+        "a minute",
+    ),
     "falsify": Claim(
         "an evolution finds planted faults in at most a fifth of the trials that chance needs, and none in the drivers",
         "falsify.md#how-soon",

@@ -114,9 +114,9 @@ def train(name: str, folder: Path, generations: int | None = None) -> None:
         curve.append(float(found.mean()))
         if generation % 10 == 0:
             print(f"{generation:4d} {found.mean():7.3f} {time.monotonic() - began:6.1f} s", flush=True)
-    Policy(lesson.shown, CARS, SKIP, *[layer[0] for layer in lesson.layers(mean[None])]).save(
-        folder / f"{name}.npz", overwrite=True
-    )
+    hidden, hidden_bias, out, out_bias = (layer[0] for layer in lesson.layers(mean[None]))
+    policy = Policy(lesson.shown, CARS, SKIP, ((hidden, hidden_bias), (out, out_bias)))
+    policy.save(folder / f"{name}.npz", overwrite=True)
     lines = ["generation,mean_return", *(f"{k},{value:.6f}" for k, value in enumerate(curve))]
     (folder / f"{name}.csv").write_text("\n".join(lines) + "\n", encoding="utf-8")
 

@@ -191,7 +191,7 @@ def test_the_road_network_that_a_configuration_names_is_not_replaced(
 def writers() -> dict[str, tuple[str, Callable[..., object]]]:
     network, instance, record = RoadNetwork.grid(2, 2), make_instance(ticks=30), dt.load_record("t.mcap")
     shown = (record.instance, record.frames, record.ending)
-    one = Policy(("x",), 0, 1, *(np.zeros(shape) for shape in ((1, 1), (1,), (2, 1), (2,))))
+    one = Policy(("x",), 0, 1, ((np.zeros((2, 1)), np.zeros(2)),))
     return {
         "replay": (".html", lambda path, **more: dt.write_replay(path, *shown, **more)),
         "plot": (".png", lambda path, **more: dt.write_plot(path, network, **more)),

@@ -1,11 +1,11 @@
-"""The controller of a learned policy: a small network on the flat observation, read from a file."""
+"""The controller of a learned policy: a network on the flat observation, read from a file."""
 
 from __future__ import annotations
 
 import zipfile
 import zlib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
@@ -27,59 +27,78 @@ MOST: Final = 1 << 24
 """Most bytes of such a file."""
 _DAMAGED: Final = (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.BadZipFile, zlib.error)
 """Errors that NumPy raises for files that it can't read."""
-_ARRAYS: Final = ("names", "cars", "frame_skip", "hidden", "hidden_bias", "out", "out_bias")
+_HEAD: Final = ("names", "cars", "frame_skip", "choices")
+"""Arrays of a policy's file beside its layers, `weights0`, `bias0`, `weights1`, ..."""
+Layer = tuple[Floats, Floats]
+NO_CHOICES: Final = np.zeros((0, 2))
 
 
 @dataclass(frozen=True)
 class Policy:
-    """A network of one hidden layer: actions are ``tanh(out tanh(hidden v + hidden_bias) + out_bias)``.
+    """A network: each layer is ``w v + b``, with a hyperbolic tangent between two.
 
     Attributes
     ----------
     names : tuple of str
-        Names of the numbers of the flat observation that make up the input v (`learning.flat.Layout`).
+        Names of the numbers of the flat observation that make up the input (`learning.flat.Layout`).
     cars : int
         Other cars that the flat observation shows.
     frame_skip : int
         Ticks for which an action is held.
-    hidden, hidden_bias, out, out_bias : (H, V), (H,), (2, H), (2,)
-        The weights.
+    layers : tuple of ((H, V), (H,))
+        Weights and biases. The last has two rows, of whose sums the hyperbolic tangents are the action; or as many as
+        there are `choices`, of which that with the largest sum is taken.
+    choices : (K, 2)
+        Actions to choose from, shares of speed and yaw rate; none where actions are continuous.
     """
 
     names: tuple[str, ...]
     cars: int
     frame_skip: int
-    hidden: Floats
-    hidden_bias: Floats
-    out: Floats
-    out_bias: Floats
+    layers: tuple[Layer, ...]
+    choices: Floats = field(default_factory=lambda: NO_CHOICES)
 
     def __post_init__(self) -> None:
-        width, seen = len(self.hidden_bias), len(self.names)
-        shapes = {"hidden": (width, seen), "hidden_bias": (width,), "out": (2, width), "out_bias": (2,)}
-        for name, shape in shapes.items():
-            found: Floats = getattr(self, name)
-            if found.shape != shape or not np.isfinite(found).all():
-                raise InputError(
-                    "not a policy", field=name, value=found.shape, expected=f"finite numbers {shape}"
-                )
+        width = len(self.names)
+        for k, (weights, bias) in enumerate(self.layers):
+            last = k == len(self.layers) - 1
+            rows = (len(self.choices) or 2) if last else len(bias)
+            _check(f"weights{k}", weights, (rows, width))
+            _check(f"bias{k}", bias, (rows,))
+            width = rows
+        _check("choices", self.choices, (len(self.choices), 2))
+        if not self.layers or np.abs(self.choices).max(initial=0.0) > 1.0:
+            which, expected = ("choices", "-1 to 1") if self.layers else ("weights0", "a layer")
+            raise InputError("not a policy", field=which, expected=expected)
         if self.frame_skip < 1 or self.cars < 0:
             raise InputError("not a policy", field="frame_skip", value=self.frame_skip, expected=">= 1")
 
     def act(self, seen: npt.NDArray[Any]) -> Floats:
         """Return the action, shares (-1 to 1) of the largest speed and yaw rate, (2,), for the input `seen`, (V,)."""
-        return np.tanh(self.out @ np.tanh(self.hidden @ seen + self.hidden_bias) + self.out_bias)
+        for weights, bias in self.layers[:-1]:
+            seen = np.tanh(weights @ seen + bias)
+        weights, bias = self.layers[-1]
+        sums: Floats = weights @ seen + bias
+        return self.choices[sums.argmax()] if len(self.choices) else np.tanh(sums)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the policy to a file `*.npz`; InputError as of `files.require_output`."""
         files.require_output(path, "a policy", (".npz",), overwrite=overwrite)
-        arrays: dict[str, Any] = {name: np.asarray(getattr(self, name)) for name in _ARRAYS}
+        arrays: dict[str, Any] = {name: np.asarray(getattr(self, name)) for name in _HEAD}
+        for k, (weights, bias) in enumerate(self.layers):
+            arrays |= {f"weights{k}": weights, f"bias{k}": bias}
 
         def write(neighbour: Path) -> None:
             with neighbour.open("wb") as stream:
                 np.savez(stream, allow_pickle=False, format=np.array(FORMAT), **arrays)
 
         files.replace_file(Path(path), write)
+
+
+def _check(name: str, array: Floats, shape: tuple[int, ...]) -> None:
+    """Refuse an array that has not this shape, or has numbers that are not finite."""
+    if array.shape != shape or not np.isfinite(array).all():
+        raise InputError("not a policy", field=name, value=array.shape, expected=f"finite numbers {shape}")
 
 
 def is_policy(path: str | Path) -> bool:
@@ -99,7 +118,7 @@ def load(path: str | Path) -> Policy:
         if Path(path).stat().st_size > MOST:
             raise InputError("too large", file=str(path), expected=f"at most {MOST} bytes")
         with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as found:
-            arrays = {name: found[name] for name in _ARRAYS}
+            arrays = {name: found[name] for name in found.files if name != "format"}
         return _policy(arrays)
     except InputError as error:
         raise error.within(file=str(path)) from None
@@ -110,9 +129,14 @@ def load(path: str | Path) -> Policy:
 
 
 def _policy(arrays: Mapping[str, Any]) -> Policy:
-    weights = {name: np.asarray(arrays[name], dtype=np.float64) for name in _ARRAYS[3:]}
+    layers: list[Layer] = []
+    while f"weights{len(layers)}" in arrays:
+        k = len(layers)
+        weights, bias = (np.asarray(arrays[f"{name}{k}"], dtype=np.float64) for name in ("weights", "bias"))
+        layers.append((weights, bias))
     names = tuple(str(name) for name in cast("list[str]", arrays["names"].tolist()))
-    return Policy(names, int(arrays["cars"]), int(arrays["frame_skip"]), **weights)
+    choices = np.asarray(arrays["choices"], dtype=np.float64)
+    return Policy(names, int(arrays["cars"]), int(arrays["frame_skip"]), tuple(layers), choices)
 
 
 def _format(path: str | Path) -> str:
