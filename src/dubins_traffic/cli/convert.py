@@ -20,6 +20,7 @@ EXAMPLES = options.examples(
     "convert out/trial-0000.mcap -o trial.csv",
     "convert out/trial-0000.mcap -o trial.parquet",
     "convert out/trial-0000.mcap -o trial.bag",
+    "convert out/trial-0000.mcap -o trial",
 )
 WORLD = ".sdf"
 
@@ -60,19 +61,22 @@ def convert(
     losses: maps.LossesOption = None,
     overwrite: options.Replace = False,
 ) -> None:
-    """Convert a road network (its suffix says to which map format) or a record (to `.csv`, `.parquet` or `.bag`).
+    """Convert a road network (its suffix says to which map format) or a record (to `.csv`, `.parquet` or a bag).
 
     Of the map of another program only what a network can hold is converted, and what was lost is told.
 
     A road network also becomes a world for Gazebo (`.sdf`); an instance or a record one with its obstacles and cars.
-    A ROS 1 bag, or a log of lcm-logger, becomes a record (`.mcap`), each further trial of it another one (`-1.mcap`,
-    ...); beside a bag stands the trial data of 2016, `.trial.json`.
+    A record becomes a bag of ROS 1 (`.bag`) or of ROS 2, a folder, if the output has no suffix.
+
+    A bag, or a log of lcm-logger, becomes a record (`.mcap`), each further trial of it another one (`-1.mcap`,
+    ...); beside a bag of ROS 1 stands the trial data of 2016, `.trial.json`.
     """
     from dubins_traffic.files import is_stream
     from dubins_traffic.gazebo.world import Version, write_sdf
     from dubins_traffic.interchange.bags import is_bag, write_bag
     from dubins_traffic.interchange.export import export
     from dubins_traffic.interchange.lcm_log import is_log
+    from dubins_traffic.interchange.ros2_bags import write_ros2_bag
     from dubins_traffic.problem.instance import Instance
     from dubins_traffic.record.reader import Record
     from dubins_traffic.roads.formats import registry as formats
@@ -83,7 +87,8 @@ def convert(
         _to_records(file, output, overwrite=overwrite)
         return
     form = None if map_format is None else formats.load(map_format)
-    options.require(output, "an output", ("",), overwrite=overwrite, apart_from=[file])
+    if not Path(output).is_dir():
+        options.require(output, "an output", ("",), overwrite=overwrite, apart_from=[file])
     with maps.telling(losses, file, output, overwrite=overwrite):
         found = load(file, map_format=form)
     network = found if isinstance(found, RoadNetwork) else None
@@ -95,6 +100,8 @@ def convert(
     elif isinstance(found, Record) and suffix == ".bag":
         options.tell(output, str(write_bag(found, output, overwrite=overwrite)))
         return
+    elif isinstance(found, Record) and suffix == "":
+        write_ros2_bag(found, output, overwrite=overwrite)
     elif isinstance(found, Record):
         export(found, output, overwrite=overwrite)
     elif isinstance(found, RoadNetwork):

@@ -1,4 +1,4 @@
-"""ROS 1 bags: records are written as bags with the trial data of 2016 beside them, so that tools of 2016 score them.
+"""Bags: records are written as bags of ROS 1 with the trial data of 2016 beside them, so that tools of 2016 score them.
 
 A bag holds what the topics of `transports.ros1` carry, one message a frame, and two topics of ours so that nothing is
 lost on the way back: the whole instance, and contacts, events and the end as JSON. Bags written here, and bags
@@ -51,6 +51,8 @@ SLACK = 1_000
 WHOLE = 0.1
 """Tolerance for the duration of a trial of 2016, of whole seconds, in a bag, and for the end of its poses, seconds."""
 MAGIC = b"#ROSBAG V2.0"
+METADATA = "metadata.yaml"
+"""What a folder has that is a bag of ROS 2."""
 Sample = tuple[float, ...]
 
 
@@ -67,6 +69,13 @@ def typestore() -> Any:
             name = f"{file.parent.parent.name}/msg/{file.stem}"
             store.register(types.get_types_from_msg(file.read_text(encoding="utf-8"), name))
     return store
+
+
+def ros2_typestore() -> Any:
+    """Return the message types that come with ROS 2; MissingExtraError without the extra `ros2`."""
+    with needs("reading and writing bags of ROS 2", "ros2"):
+        types = import_module("rosbags.typesys")
+    return types.get_typestore(types.Stores.ROS2_JAZZY)
 
 
 def trial_data_path(bag: Path | str) -> Path:
@@ -88,7 +97,7 @@ def write_bag(record: Record, path: Path | str, *, overwrite: bool = False) -> P
     data = trial_data_path(path)
     require_output(data, "trial data", DOCUMENTS, overwrite=overwrite)
     store = typestore()
-    replace_file(Path(path), lambda neighbour: _Bag(record, store).write(neighbour))
+    replace_file(Path(path), lambda neighbour: BagWriter(record, store).write(neighbour))
     trial_data(record).write(data, overwrite=overwrite)
     return data
 
@@ -116,38 +125,44 @@ def stamp(tick: int, rate: float) -> int:
     return BEGIN + round(tick * 1e9 / rate)
 
 
-class _Bag:
-    """Writes one record."""
+class BagWriter:
+    """Writes one record as a bag of ROS 1; `ros2_bags` as one of ROS 2."""
 
     def __init__(self, record: Record, store: Any) -> None:
         self._record, self._store = record, store
         self._instance: Instance = record.instance
         self._seq = 0
 
+    def _open(self, path: Path) -> Any:
+        return import_module("rosbags.rosbag1").Writer(path)
+
     def write(self, path: Path) -> None:
         """Write the file; frame by frame, poses last, as a session publishes them."""
         frames, rate = self._record.frames, self._instance.problem.rate
-        with import_module("rosbags.rosbag1").Writer(path) as self._writer:
+        with self._open(path) as self._writer:
             self._connections: dict[str, Any] = {}
-            self._put_problem(BEGIN, json.dumps(instance_to_document(self._instance, version=0)))
-            whole = json.dumps(instance_to_document(self._instance))
-            self._put(
-                INSTANCE, "integrator_chains_msgs/msg/ProblemInstanceJSON", BEGIN, self._time(BEGIN), whole
-            )
+            self._put_json(PROBLEM, BEGIN, json.dumps(instance_to_document(self._instance, version=0)))
+            self._put_json(INSTANCE, BEGIN, json.dumps(instance_to_document(self._instance)))
             for f in range(len(frames)):
                 self._put_frame(frames, f, stamp(f, rate))
             last = stamp(len(frames) - 1, rate)
             self._put_notes(last)
-            self._put_problem(last + 1, "")
+            self._put_json(PROBLEM, last + 1, "")
+
+    def _connect(self, topic: str, kind: str) -> Any:
+        return self._writer.add_connection(topic, kind, typestore=self._store)
+
+    def _serialized(self, message: Any, kind: str) -> Any:
+        return self._store.serialize_ros1(message, kind)
 
     def _put(self, topic: str, kind: str, time: int, *fields: Any) -> None:
         if topic not in self._connections:
-            self._connections[topic] = self._writer.add_connection(topic, kind, typestore=self._store)
-        data = self._store.serialize_ros1(self._store.types[kind](*fields), kind)
+            self._connections[topic] = self._connect(topic, kind)
+        data = self._serialized(self._store.types[kind](*fields), kind)
         self._writer.write(self._connections[topic], time, data)
 
-    def _put_problem(self, time: int, text: str) -> None:
-        self._put(PROBLEM, "integrator_chains_msgs/msg/ProblemInstanceJSON", time, self._time(time), text)
+    def _put_json(self, topic: str, time: int, text: str) -> None:
+        self._put(topic, "integrator_chains_msgs/msg/ProblemInstanceJSON", time, self._time(time), text)
 
     def _put_notes(self, time: int) -> None:
         record = self._record
@@ -165,18 +180,26 @@ class _Bag:
         header = self._header(time, "map")
         text = list(words(instance.problem.network, names, frames.segment[f], frames.at[f]))
         self._put(LABELS, "dubins_traffic_msgs/msg/LabelStamped", time, header, text)
-        poses = [self._pose(frames, f, n) for n in range(len(names))]
+        poses = self._put_cars(frames, f, time)
         twists: list[Any] = []
-        for n, name in enumerate(names):
+        for n in range(len(names)):
             c, s = float(frames.c[f, n]), float(frames.s[f, n])
-            speed, yaw_rate = float(frames.speed[f, n]), float(frames.yaw_rate[f, n])
-            twists.append(self._twist(speed * c, speed * s, yaw_rate))
-            self._put_odometry(name, time, poses[n], self._twist(speed, 0.0, yaw_rate))
+            speed = float(frames.speed[f, n])
+            twists.append(self._twist(speed * c, speed * s, float(frames.yaw_rate[f, n])))
+        self._put(STATES, "gazebo_msgs/msg/ModelStates", time, list(names), poses, twists)
+
+    def _put_cars(self, frames: Frames, f: int, time: int) -> list[Any]:
+        """Put odometry and commands of all cars; return their poses."""
+        names = self._instance.names
+        poses = [self._pose(frames, f, n) for n in range(len(names))]
+        for n, name in enumerate(names):
+            twist = self._twist(float(frames.speed[f, n]), 0.0, float(frames.yaw_rate[f, n]))
+            self._put_odometry(name, time, poses[n], twist)
             if f + 1 < len(frames):
                 command = float(frames.command_speed[f + 1, n]), float(frames.command_yaw_rate[f + 1, n])
                 twist = self._twist(command[0], 0.0, command[1])
                 self._put(COMMANDS.format(name), "geometry_msgs/msg/Twist", time, twist.linear, twist.angular)
-        self._put(STATES, "gazebo_msgs/msg/ModelStates", time, list(names), poses, twists)
+        return poses
 
     def _put_odometry(self, name: str, time: int, pose: Any, twist: Any) -> None:
         types = self._store.types
@@ -244,8 +267,12 @@ class _Run:
 
 @dataclass(slots=True)
 class _BagTopics:
-    """The content of a bag: poses (x, y, c, s, speed), twists and commands (speed, yaw rate) by car; trials; texts."""
+    """The content of a bag: poses (x, y, c, s, speed), twists and commands (speed, yaw rate) by car; trials; texts.
 
+    `of_ros1` tells whether poses are those of `STATES`; else they are those of odometry.
+    """
+
+    of_ros1: bool
     poses: dict[str, _Track] = field(default_factory=dict[str, _Track])
     twists: dict[str, _Track] = field(default_factory=dict[str, _Track])
     commands: dict[str, _Track] = field(default_factory=dict[str, _Track])
@@ -262,12 +289,19 @@ class _BagTopics:
 
 
 def is_bag(path: Path | str) -> bool:
-    """Tell whether the file at `path` is a ROS 1 bag."""
-    return begins_with(path, MAGIC)
+    """Tell whether a bag is at `path`: a file of ROS 1, or a folder of ROS 2."""
+    return is_ros2_bag(path) or (Path(path).is_file() and begins_with(path, MAGIC))
+
+
+def is_ros2_bag(path: Path | str) -> bool:
+    """Tell whether the folder at `path` is a bag of ROS 2."""
+    return (Path(path) / METADATA).is_file()
 
 
 def bag_to_records(path: Path | str, output: Path | str, *, overwrite: bool = False) -> list[Path]:
-    """Write each trial in the bag at `path` as a record, the first to `output`, others to ``-1``, ``-2``, ... of it.
+    """Write each trial in the bag of ROS 1 or ROS 2 at `path` as a record.
+
+    The first is written to `output`, others to ``-1``, ``-2``, ... of it.
 
     A trial begins with the problem instance and ends with the empty one, or with the last poses. Frames are taken at
     the control rate, each the latest poses at its time. A bag made elsewhere has no contacts and says nothing of
@@ -282,16 +316,18 @@ def bag_to_records(path: Path | str, output: Path | str, *, overwrite: bool = Fa
     Raises
     ------
     MissingExtraError
-        Without the extra `ros1`.
+        Without the extra `ros1`, or `ros2`.
     InputError
-        If the file is no bag, lacks poses or a problem instance, or a record can't be written.
+        If it is no bag, lacks poses or a problem instance, or a record can't be written.
     """
     name, output = str(path), Path(output)
     bag = _read(Path(path))
     if not bag.runs:
         raise InputError("no problem instance", file=name, expected=f"a message on {PROBLEM}")
     if "ego" not in bag.poses:
-        raise InputError("no poses of the ego", file=name, expected=f"messages on {STATES}")
+        raise InputError(
+            "no poses of the ego", file=name, expected=f"messages on {STATES}, or of ROS 2 on /ego/odom"
+        )
     records = record_paths(output, len(bag.runs), overwrite=overwrite)
     for number, (run, record) in enumerate(zip(bag.runs, records, strict=True)):
         instance = _instance(bag, run, number, name)
@@ -305,18 +341,19 @@ def bag_to_records(path: Path | str, output: Path | str, *, overwrite: bool = Fa
 
 
 def _read(path: Path) -> _BagTopics:
-    store = typestore()
-    rosbag1 = import_module("rosbags.rosbag1")
-    bag = _BagTopics()
+    bag = _BagTopics(of_ros1=not path.is_dir())
+    store = typestore() if bag.of_ros1 else ros2_typestore()
+    deserialize = store.deserialize_ros1 if bag.of_ros1 else store.deserialize_cdr
+    library = import_module("rosbags.rosbag1" if bag.of_ros1 else "rosbags.rosbag2")
     try:
-        with rosbag1.Reader(path) as reader:
+        with library.Reader(path) as reader:
             for connection, time, data in reader.messages():
                 kind = connection.msgtype
                 if connection.topic in (STATES, PROBLEM, INSTANCE, NOTES) or kind in _BY_CAR:
-                    _take(bag, connection.topic, time, store.deserialize_ros1(data, kind))
-    except (rosbag1.ReaderError, OSError, ValueError, KeyError) as error:
+                    _take(bag, connection.topic, time, deserialize(data, kind))
+    except (library.ReaderError, OSError, ValueError, KeyError) as error:
         raise InputError(
-            f"can't be read as a bag: {error}", file=str(path), expected="a ROS 1 bag"
+            f"can't be read as a bag: {error}", file=str(path), expected="a bag of ROS 1 or ROS 2"
         ) from error
     bag.assign()
     return bag
@@ -334,9 +371,9 @@ def _take(bag: _BagTopics, topic: str, time: int, message: Any) -> None:
             sample = (pose.position.x, pose.position.y, c, s, speed, twist.angular.z)
             bag.poses.setdefault(name, _Track()).add(time, sample)
     elif topic == PROBLEM:
-        _take_problem(bag, time, message.problemjson)
+        _take_problem(bag, time, message.problemjson if bag.of_ros1 else message.data)
     elif topic == INSTANCE:
-        bag.instances.append((time, message.problemjson))
+        bag.instances.append((time, message.problemjson if bag.of_ros1 else message.data))
     elif topic == NOTES:
         bag.notes.append((time, message.data))
     elif topic.startswith(_BEFORE) and topic.endswith(_AFTER):
@@ -346,6 +383,11 @@ def _take(bag: _BagTopics, topic: str, time: int, message: Any) -> None:
         twist = message.twist.twist
         name = topic[1 : -len("/odom")]
         bag.twists.setdefault(name, _Track()).add(time, (twist.linear.x, twist.angular.z))
+        if not bag.of_ros1:
+            pose = message.pose.pose
+            place = (pose.position.x, pose.position.y, *heading(pose.orientation.z, pose.orientation.w))
+            sample = (*place, twist.linear.x, twist.angular.z)
+            bag.poses.setdefault(name, _Track()).add(time, sample)
 
 
 def _take_problem(bag: _BagTopics, time: int, text: str) -> None:
