@@ -24,8 +24,8 @@ import numpy.typing as npt
 from dubins_traffic.cars.state import EGO, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.learning.flat_kernel import SIZE, write_flat
-from dubins_traffic.learning.outlook import OBSTACLES, new_outlook
+from dubins_traffic.learning.flat_kernel import write_flat
+from dubins_traffic.learning.outlook import SIZE, new_outlook
 from dubins_traffic.learning.seeking import look
 from dubins_traffic.roads.table import pack
 from dubins_traffic.rules.propositions import NAMES
@@ -85,7 +85,7 @@ class Layout:
             "crossing": SIZE.CROSSING,
             "goal": SIZE.GOAL,
             "clocks": SIZE.CLOCKS,
-            "obstacles": SIZE.OBSTACLE * OBSTACLES,
+            "obstacles": SIZE.OBSTACLE * SIZE.OBSTACLES,
             "cars": SIZE.CAR * self.cars,
             "laser": self.rays,
         }
@@ -108,7 +108,7 @@ class Layout:
             ("clocks", _CLOCKS),
         )
         names = [f"{part}.{name}" for part, own in fixed for name in own]
-        names += [f"obstacles[{k}].{name}" for k in range(OBSTACLES) for name in _OBSTACLE]
+        names += [f"obstacles[{k}].{name}" for k in range(SIZE.OBSTACLES) for name in _OBSTACLE]
         names += [f"cars[{k}].{name}" for k in range(self.cars) for name in _CAR]
         return (*names, *(f"laser[{k}]" for k in range(self.rays)))
 

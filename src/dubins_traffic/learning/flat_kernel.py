@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import sqrt
-from typing import Any, Final, NamedTuple
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -13,31 +13,10 @@ from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.learning.clocks import write_clocks
-from dubins_traffic.learning.outlook import OBSTACLES, Outlook, OutlookTables
+from dubins_traffic.learning.outlook import SIZE, Outlook, OutlookTables
 from dubins_traffic.learning.seeking import lane_of, metres_to_goal, next_lane
 from dubins_traffic.roads.lookup import lane_end
 from dubins_traffic.routing.lane_graph import foot, frame
-
-
-class _Size(NamedTuple):
-    """How many numbers there are in each part."""
-
-    FLAGS: int = 18
-    """Flags of a car's propositions, lowest bit first."""
-    OWN: int = 20
-    """The car itself, with its flags."""
-    LANE: int = 6
-    CROSSING: int = 6
-    """The next one."""
-    GOAL: int = 8
-    CLOCKS: int = 4
-    OBSTACLE: int = 4
-    """Each part of an obstacle."""
-    CAR: int = 27
-    """Each other car, with its flags."""
-
-
-SIZE: Final = _Size()
 
 
 @jit_inline
@@ -175,9 +154,9 @@ def _obstacles(
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         dx, dy = obstacles.parts[p].x - x, obstacles.parts[p].y - y
         d2 = dx * dx + dy * dy
-        if d2 <= own.sight * own.sight and (count < OBSTACLES or d2 < apart[count - 1]):
-            count = put_in_order(p, d2, count, OBSTACLES, near, apart)
-    for k in range(OBSTACLES):
+        if d2 <= own.sight * own.sight and (count < SIZE.OBSTACLES or d2 < apart[count - 1]):
+            count = put_in_order(p, d2, count, SIZE.OBSTACLES, near, apart)
+    for k in range(SIZE.OBSTACLES):
         at = place + k * SIZE.OBSTACLE
         for j in range(SIZE.OBSTACLE):
             out[at + j] = 0.0
@@ -188,12 +167,15 @@ def _obstacles(
             out[at + 1] = within((c * dx + s * dy) / own.sight)
             out[at + 2] = within((c * dy - s * dx) / own.sight)
             out[at + 3] = within(part.reach / own.half_width)
-    return place + OBSTACLES * SIZE.OBSTACLE
+    return place + SIZE.OBSTACLES * SIZE.OBSTACLE
 
 
 @jit_inline
 def put_in_order(which: int, d2: float, count: int, most: int, near: Ints, apart: Floats) -> int:
-    """Put `which` at the squared distance `d2` into a list of the `count` nearest, `most` of them; return how many."""
+    """Put `which` (index) at the squared distance `d2` (m^2) into the `count` (count) nearest; return how many.
+
+    At most `most` (count) are kept, in `near` (K,) with their squared distances in `apart` (K,).
+    """
     place = min(count, most - 1)
     while place > 0 and apart[place - 1] > d2:
         near[place] = near[place - 1]

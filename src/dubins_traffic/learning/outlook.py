@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING, cast
+from typing import TYPE_CHECKING, Final, NamedTuple, cast
 
 import numpy as np
 
@@ -21,8 +21,28 @@ from dubins_traffic.routing.tours import lane_graph
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
-OBSTACLES = 3
-"""Parts of obstacles that a flat observation shows."""
+
+class _Size(NamedTuple):
+    """How many numbers there are in each part of a flat observation."""
+
+    FLAGS: int = 18
+    """Flags of a car's propositions, lowest bit first."""
+    OWN: int = 20
+    """The car itself, with its flags."""
+    LANE: int = 6
+    CROSSING: int = 6
+    """The next one."""
+    GOAL: int = 8
+    CLOCKS: int = 4
+    OBSTACLE: int = 4
+    """Each part of an obstacle."""
+    OBSTACLES: int = 3
+    """How many of these are shown."""
+    CAR: int = 27
+    """Each other car, with its flags."""
+
+
+SIZE: Final = _Size()
 
 
 @record
@@ -172,7 +192,7 @@ def new_outlook(
     return OutlookTables(
         state=state, labels=labels, roads=roads, trial=trial, clock=clocks(problems), goal=goal,
         done=np.zeros(len(goal), dtype=np.int64), metres=metres,
-        near=np.zeros(max(OBSTACLES, shown), dtype=np.int64), apart=np.zeros(max(OBSTACLES, shown)),
+        near=np.zeros(max(SIZE.OBSTACLES, shown), dtype=np.int64), apart=np.zeros(max(SIZE.OBSTACLES, shown)),
         laser=laser, rays=rays, ranges=np.full((len(problems), len(rays)), np.inf),
         around=Surroundings(state, cars, obstacles),
     )  # fmt: skip
