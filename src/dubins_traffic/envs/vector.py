@@ -73,7 +73,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         observation: str = "flat",
         action: str = "continuous",
         frame_skip: int = 1,
-        reward: Mapping[str, float] | None = None,
+        reward: Mapping[str, float] | str | None = None,
         cars: int = SHOWN,
         levels: Levels | Mapping[str, Any] | int | None = None,
         formulas: Mapping[str, str] | None = None,
