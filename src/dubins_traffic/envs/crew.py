@@ -20,7 +20,7 @@ from dubins_traffic.engine.egos import Egos, Way
 from dubins_traffic.engine.group import Group
 from dubins_traffic.envs.about_ego import NAMES, count_cars, tell_cars
 from dubins_traffic.envs.fleet import Board
-from dubins_traffic.envs.step_kernel import StepTables, begin_trials, early_rounds, strides
+from dubins_traffic.envs.step_kernel import StepTables, begin_trials, strides
 from dubins_traffic.envs.terms import AT_FAULT, PARTS, TERM
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
@@ -248,8 +248,9 @@ class MultiAgentTrials:
 
     def _early(self) -> Floats:
         """Return the rounds of each trial before the ego's first breach so far, (B,)."""
-        tally = self.group.world.tally
-        return np.array([early_rounds(b, tally) for b in range(len(self.group.instances))])
+        early, trial = self.group.world.tally.early, self.group.world.tally.trial
+        goals: Ints = trial["last_goal"] - trial["first_goal"]
+        return early["rounds"] + early["goals"] / np.maximum(1, goals)
 
     def _rows(self, trials: Ints) -> Ints:
         places = self.group.state.x.shape[1]

@@ -24,7 +24,6 @@ from dubins_traffic.rules.breach_log import RULE
 from dubins_traffic.rules.fault import blamed, in_breach
 from dubins_traffic.rules.label_cache import growth_row
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.scoring.tally import Tally
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -253,12 +252,19 @@ def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables
     """Step trial b by a tick and count its results; return its status, which says why it can't go on, if so."""
     period = steps.scale[0].period
     breaches, contacts = world.breach_log.filled[0], world.work.found[0]
-    tick, early = world.progress.trial[b].tick, early_rounds(b, world.tally)
+    tick, rounds, goals = (
+        world.progress.trial[b].tick,
+        world.tally.early[b].rounds,
+        world.tally.early[b].goals,
+    )
     run_trials(steps.one, 1, period, commands, world)
     if world.progress.trial[b].tick > tick:
         steps.stride[b].left -= 1
         count_tick(b, e, outlook, steps)
-        steps.terms[e, TERM.EARLY] += early_rounds(b, world.tally) - early
+        early = world.tally.early[b]
+        if early.goals != goals or early.rounds != rounds:
+            each = 1.0 / max(1, outlook.trial[b].last_goal - outlook.trial[b].first_goal)
+            steps.terms[e, TERM.EARLY] += (early.rounds - rounds) + (early.goals - goals) * each
         _charge(e, breaches, contacts, world, steps)
         sweep(b, tick + 1, outlook)
     return world.progress.trial[b].status
@@ -308,17 +314,12 @@ def count_tick(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> Non
 @jit_inline
 def _count_breaches_that_last(e: int, bits: Any, steps: StepTables) -> None:
     """Count a tick that ends off the road, over the line without overtaking, in a disc entered against rule 3."""
+    if bits & (FLAG.ON_ROAD | FLAG.LEFT | FLAG.BREACH3) == FLAG.ON_ROAD:
+        return
     period = steps.scale[0].period
     steps.terms[e, TERM.OFF_ROAD] += period if bits & FLAG.ON_ROAD == 0 else 0.0
     steps.terms[e, TERM.LEFT] += period if bits & (FLAG.LEFT | FLAG.OVERTAKING) == FLAG.LEFT else 0.0
     steps.terms[e, TERM.CROSSING] += period if bits & FLAG.BREACH3 != 0 else 0.0
-
-
-@jit_inline
-def early_rounds(b: int, tally: Tally) -> float:
-    """Return the rounds of trial b before the ego's first breach so far (docs/rules.md#before-breach)."""
-    own, early = tally.trial[b], tally.early[b]
-    return early.rounds + early.goals / max(1, own.last_goal - own.first_goal)
 
 
 @jit_inline

@@ -69,7 +69,7 @@ def keep_time(b: int, clock: Clock, state: State, labels: Labels) -> None:
 @jit_inline
 def write_clocks(clock: Clock, out: npt.NDArray[np.float32]) -> None:
     """Write what the clocks show into `out` (4,), each from 0 to 1: the third is what is left before a forfeit."""
-    out[0] = 1.0 - clock.long / (clock.standing + clock.long)
-    out[1] = 1.0 - clock.long / (clock.waiting + clock.long)
+    out[0] = 1.0 - clock.long / (clock.standing + clock.long) if clock.standing > 0 else 0.0
+    out[1] = 1.0 - clock.long / (clock.waiting + clock.long) if clock.waiting > 0 else 0.0
     out[2] = max(0.0, 1.0 - clock.first / clock.forfeit) if clock.first > 0 else 0.0
-    out[3] = min(1.0, clock.left / clock.back)
+    out[3] = min(1.0, clock.left / clock.back) if clock.left > 0 else 0.0

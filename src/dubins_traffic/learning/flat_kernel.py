@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dubins_traffic.cars.sensing import scan, within_sight
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.kernels.compile import jit, jit_inline
+from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.learning.clocks import write_clocks
 from dubins_traffic.learning.outlook import SIZE, Outlook, OutlookTables
 from dubins_traffic.learning.seeking import lane_of, metres_to_goal, next_lane
@@ -63,7 +63,12 @@ def write_flat(b: int, n: int, out: npt.NDArray[np.float32], tables: OutlookTabl
     _goal(b, n, own, out, tables)
     place = SIZE.OWN + SIZE.LANE + SIZE.CROSSING + SIZE.GOAL
     write_clocks(tables.clock[b], out[place : place + SIZE.CLOCKS])
-    place = _obstacles(b, n, place + SIZE.CLOCKS, own, out, tables)
+    place += SIZE.CLOCKS
+    for k in range(SIZE.OBSTACLES * SIZE.OBSTACLE):
+        out[place + k] = 0.0
+    if tables.around.obstacles.off[b] != tables.around.obstacles.off[b + 1]:
+        _obstacles(b, n, place, own, out, tables)
+    place += SIZE.OBSTACLES * SIZE.OBSTACLE
     shown = (out.shape[0] - place - tables.rays.shape[0]) // SIZE.CAR
     count = _nearest(b, n, shown, own.sight2, tables)
     for k in range(shown):
@@ -143,11 +148,11 @@ def _goal(b: int, n: int, own: Outlook, out: npt.NDArray[np.float32], tables: Ou
     out[place + 7] = (goals - own.goals) / goals
 
 
-@jit
+@jit_rare
 def _obstacles(
     b: int, n: int, place: int, own: Outlook, out: npt.NDArray[np.float32], tables: OutlookTables
-) -> int:
-    """Write the nearest parts of obstacles within sight of car n from `place` on; return where the next part begins."""
+) -> None:
+    """Write the nearest parts of obstacles within sight of car n from `place` on, where zeros stand."""
     obstacles, state, near, apart = tables.around.obstacles, tables.state, tables.near, tables.apart
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
     count = 0
@@ -156,18 +161,14 @@ def _obstacles(
         d2 = dx * dx + dy * dy
         if d2 <= own.sight * own.sight and (count < SIZE.OBSTACLES or d2 < apart[count - 1]):
             count = put_in_order(p, d2, count, SIZE.OBSTACLES, near, apart)
-    for k in range(SIZE.OBSTACLES):
+    for k in range(count):
         at = place + k * SIZE.OBSTACLE
-        for j in range(SIZE.OBSTACLE):
-            out[at + j] = 0.0
-        if k < count:
-            part = obstacles.parts[int(near[k])]
-            dx, dy = part.x - x, part.y - y
-            out[at] = 1.0
-            out[at + 1] = within((c * dx + s * dy) / own.sight)
-            out[at + 2] = within((c * dy - s * dx) / own.sight)
-            out[at + 3] = within(part.reach / own.half_width)
-    return place + SIZE.OBSTACLES * SIZE.OBSTACLE
+        part = obstacles.parts[int(near[k])]
+        dx, dy = part.x - x, part.y - y
+        out[at] = 1.0
+        out[at + 1] = within((c * dx + s * dy) / own.sight)
+        out[at + 2] = within((c * dy - s * dx) / own.sight)
+        out[at + 3] = within(part.reach / own.half_width)
 
 
 @jit_inline
