@@ -42,7 +42,6 @@ if TYPE_CHECKING:
     from dubins_traffic.shield.tables import Overtakes
 
 Bools = npt.NDArray[np.bool_]
-Excuses = bool | str | float
 WINDOW: Final = "window"
 EXCUSED_FOR: Final = 1.0
 """Seconds for which a breach excuses the other side where `WINDOW` is asked for: it may have brought about so much."""
@@ -74,7 +73,7 @@ class Blame:
         If `excuses` is none of these.
     """
 
-    def __init__(self, problem: Problem, *, excuses: Excuses = True) -> None:
+    def __init__(self, problem: Problem, *, excuses: bool | str | float = True) -> None:
         self._window = _seconds_excused(excuses) * problem.rate
         rules = RuleParameters.from_mapping(problem.rules)
         self._assumed = assumed(rules)
@@ -112,7 +111,7 @@ class Blame:
         return part in self._assumed and not allowed and not self._is_excused(breach.tick, ego=False)
 
 
-def _seconds_excused(excuses: Excuses) -> float:
+def _seconds_excused(excuses: bool | str | float) -> float:
     """Return for how many seconds what one side breaks excuses the other."""
     if excuses == WINDOW:
         return EXCUSED_FOR
@@ -139,7 +138,7 @@ class Roles:
     """The controller that drives the ego, by its name; None if a learner does."""
     shields: dict[int, Overtakes] = field(default_factory=dict[int, "Overtakes"])
     """Of cars under a shield, by number, when they may cross the centre line."""
-    excuses: Excuses = True
+    excuses: bool | str | float = True
     """Whether what one side breaks after the other costs nothing, or for how many seconds (`Blame`)."""
 
 

@@ -13,7 +13,7 @@ from pettingzoo import ParallelEnv  # pyright: ignore[reportMissingTypeStubs]
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import Excuses, MultiAgentTrials, Roles
+from dubins_traffic.envs.crew import MultiAgentTrials, Roles
 from dubins_traffic.envs.pictures import SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import Pay
@@ -86,7 +86,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         ego: str | None = None,
         learned: Sequence[str] | None = None,
         reward: Mapping[str, Mapping[str, float]] | None = None,
-        excuses: Excuses = True,
+        excuses: bool | str | float = True,
         action: str = "continuous",
         frame_skip: int = 1,
         cars: int = SHOWN,
