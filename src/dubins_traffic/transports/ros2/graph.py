@@ -92,7 +92,7 @@ class Graph:
 
     def writer(self, topic: str, kind: Any, *, latched: bool = False) -> Any:
         """Return a writer of messages of type `kind`."""
-        qos = quality(latched=latched, of=kind)
+        qos = quality(latched=latched, depth=1 if latched else DEPTH, of=kind)
         writer = DataWriter(self._publisher, Topic(self._participant, topic, kind), qos=qos)
         self._node.writer_gid_seq.append(_gid(writer))
         self._tell()
