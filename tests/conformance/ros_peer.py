@@ -14,7 +14,6 @@ from tests.conformance.transport import PATIENT, TransportConformance
 from tests.recordings import make_instance
 
 RATE = 30.0
-PATIENCE = 600.0
 Odometry = tuple[float, float, float]
 """Stamp, x and y."""
 
@@ -46,7 +45,7 @@ class RosPeer:
 
     def await_seen(self, there: bool) -> None:
         """Wait until the session knows that this peer is there, or gone."""
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + PATIENT
         while True:
             self.transport.look()
             if bool(self.transport._there.get(self.car)) is there:
@@ -61,7 +60,7 @@ class RosPeer:
             self.begun = isinstance(came, str) and came != ""
             self.start: tuple[float, float] | None = None
             self.answered = -1
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + PATIENT
         while not self.heard():
             assert time.monotonic() < until
             time.sleep(0.01)
@@ -89,7 +88,7 @@ class RosPeer:
         self.put(speed, yaw_rate)
 
     def next(self) -> str | Odometry:
-        until = time.monotonic() + PATIENCE
+        until = time.monotonic() + PATIENT
         while (came := self.fetch()) is None:
             assert time.monotonic() < until, "nothing comes"
         return came

@@ -33,6 +33,7 @@ from dubins_traffic.rules.breach_log import RULE, RULES
 from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, accused, order
+from dubins_traffic.scoring.duration import early_rounds
 from dubins_traffic.scoring.verdict import assumed, assumption_of
 from dubins_traffic.shield.car_shields import CarShields
 
@@ -214,11 +215,12 @@ class MultiAgentTrials:
         self.terms[:] = 0.0
         self.broken[:] = 0
         self.stepped_in[:] = 0
-        begun = self.group.active
+        begun, early = self.group.active, self._early()
         for _ in range(ticks):
             if not len(self.group.active):
                 break
             self._tick(asked)
+        self.terms[:, EGO, TERM.EARLY] = self._early() - early
         self._observe(begun)
 
     def _tick(self, asked: Floats) -> None:
@@ -230,7 +232,7 @@ class MultiAgentTrials:
             ticks: Ints = np.full(len(group.instances), -1)
             ticks[running] = group.ticks[running]
             self.stepped_in += shields.filter(ticks, commands) != 0
-        before, early = group.ticks.copy(), self._early()
+        before = group.ticks.copy()
         group.advance()
         self.given.append(commands.copy())
         moved: Ints = np.flatnonzero(group.ticks > before)
@@ -239,7 +241,6 @@ class MultiAgentTrials:
         self._views.look(moved)
         lasting: Floats = self.terms[..., TERM.OFF_ROAD : TERM.BREACHES].copy()
         self._count(self._rows(moved), int(group.ticks[moved[0]]), self.outlook, self._steps)
-        self.terms[:, EGO, TERM.EARLY] += self._early() - early
         self._charge(moved)
         for b in map(int, moved):
             excused = self.blame[b].excused(self.terms.shape[1], int(group.ticks[b]))
@@ -247,9 +248,9 @@ class MultiAgentTrials:
 
     def _early(self) -> Floats:
         """Return the rounds of each trial before the ego's first breach so far, (B,)."""
-        early, trial = self.group.world.tally.early, self.group.world.tally.trial
-        goals: Ints = trial["last_goal"] - trial["first_goal"]
-        return early["rounds"] + early["goals"] / np.maximum(1, goals)
+        tally = self.group.world.tally
+        goals: Ints = tally.trial["last_goal"] - tally.trial["first_goal"]
+        return np.array([early_rounds(tally.early[b], each, None) for b, each in enumerate(goals.tolist())])
 
     def _rows(self, trials: Ints) -> Ints:
         places = self.group.state.x.shape[1]

@@ -60,22 +60,11 @@ def write_minari(
     }
     shown = gymnasium.make(NAME, disable_env_checker=True, **more)
     env = TrafficEnv(observation="object", **more)
-    buffers: list[Any] = []
-    for number in range(episodes):
-        seen, info = env.reset(seed=seed, options={"episode": number})
-        driver = load(controller)
-        driver.start(info["trial"].problem)
-        kept = _Kept(env)
-        while not kept.over:
-            command = driver.act(seen)
-            if command is None:
-                raise InputError(
-                    "gives up", file=controller, value=number, expected="a command in every step"
-                )
-            seen = kept.step(_shares(env.settings.actions, command))
-        buffers.append(
-            collector.EpisodeBuffer(id=number, seed=seed, options={"episode": number}, **kept.columns())
-        )
+    which = [{"seed": seed, "options": {"episode": number}} for number in range(episodes)]
+    buffers = [
+        collector.EpisodeBuffer(id=number, **own, **_driven(env, controller, own))
+        for number, own in enumerate(which)
+    ]
     with warnings.catch_warnings():
         # It warns of authors and links, which whoever publishes a dataset adds.
         warnings.simplefilter("ignore", UserWarning)
@@ -86,6 +75,21 @@ def write_minari(
             )  # fmt: skip
         except ValueError as error:
             raise InputError(f"no dataset ({error})", field="dataset", value=dataset) from None
+
+
+def _driven(env: TrafficEnv, controller: str, which: Mapping[str, Any]) -> dict[str, Any]:
+    """Drive the episode that `which` (arguments of a reset) names, and return it in Minari's words."""
+    seen, info = env.reset(**which)
+    driver = load(controller)
+    driver.start(info["trial"].problem)
+    kept = _Kept(env)
+    while not kept.over:
+        command = driver.act(seen)
+        if command is None:
+            expected = "a command in every step"
+            raise InputError("gives up", file=controller, value=dict(which), expected=expected)
+        seen = kept.step(_shares(env.settings.actions, command))
+    return kept.columns()
 
 
 def _shares(actions: ActionMap, command: tuple[float, float]) -> Any:

@@ -161,9 +161,9 @@ PEER: Final[Mapping[str, float]] = {
 ROLES: Final[Mapping[str, Mapping[str, float]]] = {"adversaries": ADVERSARY, "peers": PEER}
 """The roles of e-agents."""
 PEERS_DEBTS: Final[Mapping[str, float]] = {
-    **dict.fromkeys(LASTING, 0.2),
+    **{name: DEBTS[name] for name in LASTING},
     **dict.fromkeys(ASSUMPTIONS, 1.0),
-    "E2": 7.0,
+    "E2": DEBTS["at_fault"],
 }
 """What a unit of each term, or a breach of its part of the assumption, adds to the debt of a peer."""
 _FIRST: Final = len(COSTS)
@@ -217,7 +217,7 @@ class Pay:
             costly: Floats = broken[EGO, :_FIRST].astype(np.float64)
             of_ego = np.concatenate([terms[EGO, : TERM.BREACHES], costly])
             self._debt[car] = debt + float(of_ego @ self._debts)
-            of_ego[: TERM.PROGRESS + 1] *= share
+            of_ego[: EARNED.stop] *= share
             weighted: list[float] = (of_ego * self._ego).tolist()
             told = {"reward_terms": dict(zip(TERMS, weighted, strict=True)), "cost": float(cost_of(costly))}
             return sum(weighted), told | {"costs": dict(zip(COSTS, costly.tolist(), strict=True))}

@@ -141,13 +141,17 @@ class BagWriter:
         frames, rate = self._record.frames, self._instance.problem.rate
         with self._open(path) as self._writer:
             self._connections: dict[str, Any] = {}
-            self._put_json(PROBLEM, BEGIN, json.dumps(instance_to_document(self._instance, version=0)))
-            self._put_json(INSTANCE, BEGIN, json.dumps(instance_to_document(self._instance)))
+            self._put_still()
             for f in range(len(frames)):
                 self._put_frame(frames, f, stamp(f, rate))
             last = stamp(len(frames) - 1, rate)
             self._put_notes(last)
             self._put_json(PROBLEM, last + 1, "")
+
+    def _put_still(self) -> None:
+        """Put what stays as it is throughout the trial."""
+        self._put_json(PROBLEM, BEGIN, json.dumps(instance_to_document(self._instance, version=0)))
+        self._put_json(INSTANCE, BEGIN, json.dumps(instance_to_document(self._instance)))
 
     def _connect(self, topic: str, kind: str) -> Any:
         return self._writer.add_connection(topic, kind, typestore=self._store)

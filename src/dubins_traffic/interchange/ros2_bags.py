@@ -106,11 +106,14 @@ class _Ros2BagWriter(BagWriter):
     def _put_json(self, topic: str, time: int, text: str) -> None:
         self._put(topic, "std_msgs/msg/String", time, text)
 
+    def _put_still(self) -> None:
+        super()._put_still()
+        self._put_roads()
+        self._put_mounts()
+        self._breaches = _breaches(self._record)
+
     def _put_frame(self, frames: Frames, f: int, time: int) -> None:
         instance = self._instance
-        if f == 0:
-            self._put_roads()
-            self._breaches = _breaches(self._record)
         self._put("/clock", "rosgraph_msgs/msg/Clock", time, self._time(time))
         text = " ".join(words(instance.problem.network, instance.names, frames.segment[f], frames.at[f]))
         self._put(LABELS, "std_msgs/msg/String", time, text)
@@ -127,25 +130,24 @@ class _Ros2BagWriter(BagWriter):
             self._put_markers(BREACHES, time, [shown])
 
     def _put_transforms(self, poses: Iterable[Any], time: int) -> None:
-        """Put where each car's odometry, footprint and base lie, as a session tells it."""
-        moving: list[Any] = []
-        fixed: list[Any] = []
-        for name, pose in zip(self._instance.names, poses, strict=True):
-            still = self._quaternion()
-            moving.append(
-                self._transform(
-                    time, f"{name}/odom", f"{name}/base_footprint", pose.position, pose.orientation
-                )
-            )
-            fixed.append(self._transform(time, "map", f"{name}/odom", self._vector(), still))
-            fixed.append(
-                self._transform(
-                    time, f"{name}/base_footprint", f"{name}/base_link", self._vector(z=BASE), still
-                )
-            )
-        if time == BEGIN:
-            self._put("/tf_static", "tf2_msgs/msg/TFMessage", time, fixed)
+        """Put where each car's footprint is by its odometry."""
+        moving = [
+            self._transform(time, f"{name}/odom", f"{name}/base_footprint", pose.position, pose.orientation)
+            for name, pose in zip(self._instance.names, poses, strict=True)
+        ]
         self._put("/tf", "tf2_msgs/msg/TFMessage", time, moving)
+
+    def _put_mounts(self) -> None:
+        """Put where each car's odometry begins and its base is above its footprint, as a session tells it."""
+        fixed: list[Any] = []
+        for name in self._instance.names:
+            for parent, child, height in (
+                ("map", f"{name}/odom", 0.0),
+                (f"{name}/base_footprint", f"{name}/base_link", BASE),
+            ):
+                place = self._vector(z=height)
+                fixed.append(self._transform(BEGIN, parent, child, place, self._quaternion()))
+        self._put("/tf_static", "tf2_msgs/msg/TFMessage", BEGIN, fixed)
 
     def _transform(self, time: int, parent: str, child: str, place: Any, turn: Any) -> Any:
         moved = self._make("geometry_msgs/msg/Transform", self._vector(place.x, place.y, place.z), turn)
@@ -243,8 +245,8 @@ def _breaches(record: Record) -> dict[int, list[tuple[int, str]]]:
 def _latched() -> Any:
     """Return the quality of service of topics whose last message late listeners get."""
     given = import_module("rosbags.interfaces")
-    never, lease = given.QosTime(2147483647, 4294967295), given.QosTime(2147483647, 4294967295)
+    never = given.QosTime(2147483647, 4294967295)
     return given.Qos(
         given.QosHistory.KEEP_LAST, 10, given.QosReliability.RELIABLE, given.QosDurability.TRANSIENT_LOCAL,
-        never, never, given.QosLiveliness.AUTOMATIC, lease, False,
+        never, never, given.QosLiveliness.AUTOMATIC, never, False,
     )  # fmt: skip

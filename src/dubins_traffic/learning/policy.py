@@ -30,7 +30,6 @@ _DAMAGED: Final = (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.B
 _HEAD: Final = ("names", "cars", "frame_skip", "choices")
 """Arrays of a policy's file beside its layers, `weights0`, `bias0`, `weights1`, ..."""
 Layer = tuple[Floats, Floats]
-NO_CHOICES: Final = np.zeros((0, 2))
 
 
 @dataclass(frozen=True)
@@ -56,7 +55,7 @@ class Policy:
     cars: int
     frame_skip: int
     layers: tuple[Layer, ...]
-    choices: Floats = field(default_factory=lambda: NO_CHOICES)
+    choices: Floats = field(default_factory=lambda: np.zeros((0, 2)))
 
     def __post_init__(self) -> None:
         width = len(self.names)
