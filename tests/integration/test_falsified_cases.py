@@ -31,7 +31,8 @@ def test_rules_gets_past_who_stands_askew_beside_it() -> None:
     """It waited for good beside a car that moved while it was being passed, behind it or where it would return.
 
     Or it had stopped, still left of its lane, where it could only go straight to the right before a disc, or a little
-    back; or it did not lean past who stood in a bend.
+    back; or it did not lean past who stood in a bend, or leaned there to the inner corner of the road, where nothing is
+    open to it.
     """
     assert [
         own.file.name for own in outcomes(cases_in(CONTRACT / "blocked"), "rules") if not own.passed

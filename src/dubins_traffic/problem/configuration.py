@@ -17,7 +17,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.files import exists, is_file
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.problem.faults import parse, version_of
-from dubins_traffic.problem.files import Kind, Source, detect, parse_json, plain, read_source
+from dubins_traffic.problem.files import Kind, Source, plain, read_source
 from dubins_traffic.problem.instance import EAgent
 from dubins_traffic.problem.kinds import kind_of, parameters_of
 from dubins_traffic.problem.settings import VERSION_0_KEYS, AgentEntry, Settings, Settings0
@@ -169,15 +169,8 @@ def load_config(
     if isinstance(source, Mapping):
         return Configuration.from_document(source, rnd=rnd)
     found = find_source(source)
-    document = parse_json(found.text, found.name)
-    kind = detect(document, found.name)
-    if kind is not Kind.CONFIGURATION:
-        raise InputError(
-            f"not a trials configuration but a {kind}",
-            file=found.name,
-            value=sorted(document),
-            expected="problem_domain, rnd, e-agents, ...",
-        )
+    wanted = "a trials configuration", "problem_domain, rnd, e-agents, ..."
+    document = found.document(Kind.CONFIGURATION, *wanted)
     return Configuration.from_document(document, found.name, found.folder, rnd)
 
 

@@ -40,6 +40,15 @@ class Source:
     folder: Path | None
     text: str
 
+    def document(self, kind: Kind, wanted: str, keys: str) -> dict[str, Any]:
+        """Return the JSON object in the text; InputError unless it is of a `kind`, `wanted` in words, with `keys`."""
+        document = parse_json(self.text, self.name)
+        found = detect(document, self.name)
+        if found is not kind:
+            problem = f"not {wanted} but a {found}"
+            raise InputError(problem, file=self.name, value=sorted(document), expected=keys)
+        return document
+
 
 def read_source(path: str | os.PathLike[str]) -> Source:
     """Return the text of the file at `path`, or standard input for ``-``.

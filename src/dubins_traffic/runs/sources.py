@@ -119,11 +119,7 @@ def _load(
         case Kind.INSTANCE:
             return instance_from_document(document, found.name, seed)
         case _:
-            raise InputError(
-                f"holds {kind}",
-                file=found.name,
-                expected=KINDS,
-            )
+            raise InputError(f"holds {kind}", file=found.name, expected=KINDS)
 
 
 def _holds_record(source: str | os.PathLike[str]) -> bool:

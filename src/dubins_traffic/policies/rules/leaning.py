@@ -6,6 +6,8 @@ the middle of its lane and one that stands at the centre line, yet the lane is f
 
 from __future__ import annotations
 
+from math import sqrt
+
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
@@ -114,4 +116,9 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
                 offset = min(offset, left - half - clear)
             elif part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:
                 offset = left + half + clear
-    return max(offset, EDGE - vehicle.middle)
+    most = EDGE - vehicle.middle
+    if part == PART.THROUGH and way.side < 0.0 and way.radius > vehicle.middle:
+        # The road's inner corner is nearer than its edge.
+        half = sqrt(0.5 + 0.5 * (way.ux * way.tx + way.uy * way.ty))
+        most = max(most, (way.radius - vehicle.middle) / half - way.radius + EDGE)
+    return max(offset, most)
