@@ -1,4 +1,4 @@
-"""Environments for learning, against whole compiled trials and highway-env, in one run.
+"""Environments for learning, against whole compiled trials and highway-env, in one run; several learners against one.
 
 64 environments of 8 cars: seven `lawful` e-agents and the ego on a grid of 4 x 5 intersections, all rules judged, 20 s.
 They are stepped every tick (`frame_skip` 1) with the commands that the controller `rules` gives in these very trials,
@@ -21,11 +21,13 @@ from benchmarks.table import Row
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.engine.group import Group
 from dubins_traffic.envs.episodes import Episodes
+from dubins_traffic.envs.parallel_vector import TrafficParallelVectorEnv
+from dubins_traffic.envs.vector import TrafficVectorEnv
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.instance import Instance
 
-ENVS, AGENTS, DURATION, ROUNDS, SKIP = 64, 7, 20, 7, 4
+ENVS, AGENTS, DURATION, ROUNDS, SKIP, STEPS = 64, 7, 20, 7, 4, 300
 HIGHWAY = peers.Peer("highway-env", "highway", "drivers, observed every tick")
 
 
@@ -57,9 +59,34 @@ def measure() -> list[Row]:
             "",
             True,
         ),
+        _several(document),
         Row("a reset, of all environments at once", f"{1e3 * reset:.3f} ms", "<= 0.2 ms", reset <= 2e-4),
         _against(highway.what, cars * ticks / every, highway.per_second, 2000.0, "car-steps/s"),
     ]
+
+
+def _several(document: dict[str, Any]) -> Row:
+    """Return the row that compares the steps of learners that drive all cars with those of one."""
+    rates: list[list[float]] = [[], []]
+    makers = (lambda: TrafficVectorEnv(ENVS, document), (ENVS, 2)), (
+        lambda: TrafficParallelVectorEnv(ENVS, document), (ENVS, AGENTS + 1, 2)
+    )  # fmt: skip
+    for _ in range(ROUNDS):
+        for found, (make, shape) in zip(rates, makers, strict=True):
+            env, actions = make(), np.random.default_rng(1).uniform(0.0, 1.0, shape)
+            env.reset(seed=1)
+            env.step(actions)
+            began = process_time()
+            for _ in range(STEPS):
+                env.step(actions)
+            found.append(float(np.prod(shape[:-1])) * STEPS / (process_time() - began))
+    one, every = map(max, rates)
+    return Row(
+        f"{AGENTS + 1} learners in each, steps of all of them",
+        f"{every:.2e} steps/s = {every / one:.2f} of those of one",
+        ">= 0.4 of those of one",
+        every / one >= 0.4,
+    )
 
 
 def _against(what: str, ours: float, rate: float | None, least: float, unit: str = "steps/s") -> Row:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from benchmarks.table import Row, show
 
-from dubins_traffic.envs.crew import EXCUSED_FOR, WINDOW
+from dubins_traffic.envs.blame import EXCUSED_FOR, WINDOW
 from dubins_traffic.envs.parallel import parallel_env
 
 EPISODES = 40

@@ -43,7 +43,8 @@ GROUPS: dict[str, tuple[str, tuple[str, ...]]] = {
         "Learning",
         (
             "envs.single.TrafficEnv", "envs.vector.TrafficVectorEnv", "envs.shielded_ego.ShieldedEgo",
-            "envs.parallel.parallel_env", "envs.parallel.TrafficParallelEnv", "envs.shielded.Shielded",
+            "envs.parallel.parallel_env", "envs.parallel.TrafficParallelEnv",
+            "envs.parallel_vector.TrafficParallelVectorEnv", "envs.shielded.Shielded",
             "learning.flat.Layout", "learning.flat.FlatObserver", "learning.policy.Policy",
             "animation.raster.Raster",
         ),

@@ -14,9 +14,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import MultiAgentTrials, Roles
+from dubins_traffic.envs.crew import CrewFleet, Roles
 from dubins_traffic.envs.settings import Settings
-from dubins_traffic.envs.terms import PARTS, TERM, WEIGHTS
+from dubins_traffic.envs.terms import PAID, WEIGHTS, Pay
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.scoring.verdict import ASSUMPTIONS
 
@@ -40,6 +40,10 @@ SHOWN = [
     *(len(_FLAT) + NAMES.index(name) for name in NAMES if name not in ("is_ego", "speed", "yaw_rate")),
 ]
 """The numbers of an observation that the policy is shown."""
+PARTS, TASK = (
+    [PAID.index(name) for name in ASSUMPTIONS],
+    [PAID.index(name) for name in ("visits", "progress")],
+)
 PRICES = np.array([1.0, 5.0, 1.0, 1.0, 1.0, 1.0])
 """What a breach of E1 to E6 costs."""
 
@@ -56,24 +60,27 @@ def drive(ego: str, policies: Sequence[Floats] | None, seed: int, trials: Sequen
     """Drive trials of a seed, each with its own policy, or with `lawful` e-agents; return what came of each."""
     learned = list(range(1, CARS + 1)) if policies is not None else []
     roles = Roles(learned, ego, dict.fromkeys(learned, "sure"), excuses=False)
-    crew = MultiAgentTrials(SETTINGS.episodes.draw([(seed, trial, 0) for trial in trials]), roles, SETTINGS)
-    asked, broken = np.zeros((*crew.group.state.x.shape, 2)), np.zeros((len(trials), len(PARTS)))
-    paid, stacked = np.zeros(len(trials)), np.array(policies) if policies is not None else None
-    bounds = SETTINGS.sample.problem.car.bounds
-    while len(crew.group.active):
+    fleet = CrewFleet(SETTINGS, len(trials), roles, Pay("adversaries"))
+    for env, trial in enumerate(trials):
+        fleet.seed(env, (seed, trial))
+    fleet.begin(range(len(trials)))
+    broken, paid = np.zeros((len(trials), len(ASSUMPTIONS))), np.zeros(len(trials))
+    stacked = np.array(policies) if policies is not None else None
+    while not fleet.ended.all():
+        running = ~fleet.ended
+        shares = np.zeros((len(trials), len(learned), 2))
         if stacked is not None:
-            seen = crew.observed[:, :, SHOWN]
+            seen = fleet.observed[:, :, SHOWN]
             shares = np.tanh(np.einsum("bni,bij->bnj", seen, stacked[:, :-1]) + stacked[:, None, -1])
-            asked[:] = np.clip(shares, [-0.2, -1.0], 1.0) * [bounds.speed, bounds.yaw_rate]
-        crew.step(asked, SKIP)
-        task = crew.terms[:, 0, [TERM.VISITS, TERM.PROGRESS]] @ [WEIGHTS["visits"], WEIGHTS["progress"]]
-        charged = crew.broken[:, 1:, len(PARTS) - len(ASSUMPTIONS) :].sum(axis=1)
-        broken += crew.broken[:, 1:].sum(axis=1)
-        paid -= task + charged @ PRICES / CARS
-    scores = [one.score for one in crew.group.outcomes(list(range(len(trials))), ego)]
+        fleet.step(np.clip(shares, [-0.2, -1.0], 1.0))
+        terms = fleet.board.arrays["terms"].reshape(len(trials), CARS + 1, len(PAID))[running]
+        charged = terms[:, 1:, PARTS].sum(axis=1)
+        broken[running] += charged
+        paid[running] -= terms[:, 0, TASK] @ [WEIGHTS[PAID[k]] for k in TASK] + charged @ PRICES / CARS
+    scores = [one.score for one in fleet.outcomes(range(len(trials)))]
     return {
         "paid": paid,
-        "broken": broken[:, len(PARTS) - len(ASSUMPTIONS) :],
+        "broken": broken,
         "rounds": np.array([one.verdict.rounds if one.verdict else 0 for one in scores], dtype=np.float64),
         "visits": np.array([sum(goal.visits for goal in one.goals) for one in scores], dtype=np.float64),
         "clean": np.array([bool(one.verdict and one.verdict.clean) for one in scores], dtype=np.float64),

@@ -51,7 +51,7 @@ def test_all_that_trials_batches_games_and_environments_call_is_built() -> None:
         "envs.step_kernel.begin_trials",
         "envs.step_kernel.step_trials",
         "envs.step_kernel.observe_trials",
-        "envs.about_ego.tell_cars",
+        "envs.crew_kernel.step_crews",
         "animation.raster_kernel.paint",
     } <= set(names)
 

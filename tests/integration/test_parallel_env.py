@@ -69,8 +69,9 @@ def driven(env: Any, seed: int, steps: int = 10**6, bias: float = 0.5) -> list[A
         actions = {
             name: np.clip(np.add(chance.uniform(-1.0, 1.0, 2), (bias, 0.0)), -1.0, 1.0) for name in env.agents
         }
-        state = env.unwrapped._crew.group.state
-        found.append((*env.step(actions), [array[0, :cars].copy() for array in state[:6]]))
+        bank, row = env.unwrapped.fleet.seat(0)
+        state = bank.group.state
+        found.append((*env.step(actions), [array[row, :cars].copy() for array in state[:6]]))
     return found
 
 
@@ -129,9 +130,8 @@ def test_run_trial_makes_the_frames_of_an_episode_again(more: dict[str, Any], sh
     breaches = (
         [(one.rule, one.tick) for one in result.score.verdict.violations] if result.score.verdict else []
     )
-    group = inner._crew.group if inner._crew else None
-    assert group is not None
-    assert {(one.rule, one.tick) for one in group.breaches[0]} <= set(breaches)
+    bank, row = inner.fleet.seat(0)
+    assert {(one.rule, one.tick) for one in bank.group.breaches[row]} <= set(breaches)
     assert breaches or shielded
 
 
@@ -320,7 +320,7 @@ def test_environments_of_gymnasium_are_drawn_alike_one_by_one_and_many_at_once()
 
 def test_the_page_on_agents_runs(tmp_path: Path) -> None:
     blocks = runnable((ROOT / "docs" / "learning-agents.md").read_text(encoding="utf-8"))
-    assert len(blocks) == 2
+    assert len(blocks) == 3
     for language, text in blocks:
         run_block(language, text, tmp_path)
     assert "episode.mcap" in {path.name for path in tmp_path.iterdir()}

@@ -6,10 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.envs.step_kernel import StepTables, count_tick
-from dubins_traffic.kernels.arrays import Ints
+from dubins_traffic.envs.step_kernel import StepTables
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.learning.flat_kernel import near_far, sweep, within, write_bearing, write_flat
+from dubins_traffic.learning.flat_kernel import near_far, within, write_bearing
 from dubins_traffic.learning.outlook import OutlookTables
 
 NAMES = (
@@ -21,30 +20,11 @@ Flats = npt.NDArray[np.float32]
 
 
 @jit
-def count_cars(rows: Ints, tick: int, outlook: OutlookTables, steps: StepTables) -> None:
-    """Count, for the cars of some `rows` (K,), what the tick has brought that ended in frame `tick`."""
-    for k in range(rows.shape[0]):
-        row: int = rows[k]
-        count_tick(row, row, outlook, steps)
-        sweep(row, tick, outlook)
+def tell(row: int, first: int, place: int, out: Flats, outlook: OutlookTables, steps: StepTables) -> None:
+    """Write what the car of a `row` (row) is told of the ego into `out` (F,).
 
-
-@jit
-def tell_cars(rows: Ints, cars: int, facts: Flats, outlook: OutlookTables, steps: StepTables) -> None:
-    """Write what the cars of some `rows` (K,) observe, and into `facts` (V, T) what they are told of the ego.
-
-    `cars` (count) is how many rows a trial has; its first row is the ego's.
+    The ego stands in a `place` (index) of it, and in the row `first` (row).
     """
-    for k in range(rows.shape[0]):
-        row: int = rows[k]
-        write_flat(row, EGO, steps.flat[row], outlook)
-        number = row % cars
-        _tell(row, row - number, 0 if number == 0 else 1, facts[row], outlook, steps)
-
-
-@jit
-def _tell(row: int, first: int, place: int, out: Flats, outlook: OutlookTables, steps: StepTables) -> None:
-    """Write what the car of a row is told of the ego, which stands in a place of it, and in the row `first`."""
     state, car, ego = outlook.state, outlook.trial[row], outlook.trial[first]
     x, y, c, s = state.x[row, EGO], state.y[row, EGO], state.c[row, EGO], state.s[row, EGO]
     ec, es = state.c[row, place], state.s[row, place]

@@ -38,7 +38,8 @@ if TYPE_CHECKING:
 
     from dubins_traffic.engine.group import Outcome
     from dubins_traffic.envs.settings import Settings
-    from dubins_traffic.problem.instance import Instance
+    from dubins_traffic.learning.outlook import OutlookTables
+    from dubins_traffic.problem.instance import Instance, Problem
     from dubins_traffic.scoring.formulas import Status
     from dubins_traffic.shield.tables import Overtakes
 
@@ -52,10 +53,13 @@ class Board:
         How many there are.
     settings : Settings
         What they have in common.
+    cars, terms : int
+        Rows of an environment, and terms of the reward, where several cars of each are looked at.
     """
 
-    def __init__(self, envs: int, settings: Settings) -> None:
-        weights, actions = settings.weights, settings.actions
+    def __init__(self, envs: int, settings: Settings, cars: int = 1, terms: int | None = None) -> None:
+        weights, actions, rows = settings.weights, settings.actions, envs * cars
+        terms = len(weights) if terms is None else terms
         scale = table(Scale, 1)
         scale[0].period = 1.0 / settings.sample.problem.rate
         scale[0].pause = 1 if settings.formulas or settings.disturbed else 0
@@ -64,15 +68,15 @@ class Board:
         scale[0].speed, scale[0].yaw_rate = actions.half.tolist()
         self.arrays: dict[str, Any] = {
             "scale": scale,
-            "asked": np.zeros((envs, 2)),
-            "terms": np.zeros((envs, len(weights))),
-            "weighted": np.zeros((envs, len(weights))),
+            "asked": np.zeros((rows, 2)),
+            "terms": np.zeros((rows, terms)),
+            "weighted": np.zeros((rows, terms)),
             "weights": weights,
             "debts": settings.debts,
             "cost_of": costs_of_rules(),
-            "reward": np.zeros(envs),
+            "reward": np.zeros(rows),
             "status": np.zeros(envs, dtype=np.int64),
-            "flat": np.zeros((envs, settings.layout.size), dtype=np.float32),
+            "flat": np.zeros((rows, settings.layout.size), dtype=np.float32),
             "one": np.zeros(1, dtype=np.int64),
         }
 
@@ -82,36 +86,44 @@ class Bank:
 
     Parameters
     ----------
-    instances : sequence of Instance
-        One a trial, of one configuration.
+    group : Group
+        The trials, of one configuration.
+    outlook : OutlookTables
+        From what they are observed.
     board : Board
         What their steps are written to.
+    each : sequence of Problem
+        That of each row of `outlook`.
     shown : int
         Other cars that a flat observation shows, at most.
 
     Attributes
     ----------
-    group : Group
-        The trials.
     watches : dict
         Who judges formulas on the trials that are watched, by their rows.
     between : dict
         What stands between environments and their egos, of trials that are disturbed or under a shield, by their rows.
     """
 
-    def __init__(self, instances: Sequence[Instance], board: Board, shown: int) -> None:
+    def __init__(
+        self, group: Group, outlook: OutlookTables, board: Board, each: Sequence[Problem], shown: int
+    ) -> None:
         self._shown = shown
-        self.group = Group(instances, keeps_rules=False)
-        world = self.group.world
-        problems = [instance.problem for instance in instances]
-        nets: Ints = np.ascontiguousarray(world.rules["net"])
-        around = world.state, world.labels, world.cars, world.obstacles
-        self.outlook = new_outlook(problems, nets, world.roads, around, shown)
-        self.steps = StepTables(stride=strides(problems), **board.arrays)
+        self.group, self.outlook = group, outlook
+        self.steps = StepTables(stride=strides(each), **board.arrays)
         self._step, self._observe = bound(step_trials), bound(observe_trials)
         self.watches: dict[int, FormulaWatch] = {}
         self.between: dict[int, EgoChannel] = {}
-        begin_trials(self.outlook, self.steps)
+        begin_trials(outlook, self.steps)
+
+    @staticmethod
+    def of(instances: Sequence[Instance], board: Board, shown: int) -> Bank:
+        """Return the bank of trials of egos, one an instance."""
+        group = Group(instances, keeps_rules=False)
+        world, problems = group.world, [instance.problem for instance in instances]
+        nets: Ints = np.ascontiguousarray(world.rules["net"])
+        around = world.state, world.labels, world.cars, world.obstacles
+        return Bank(group, new_outlook(problems, nets, world.roads, around, shown), board, problems, shown)
 
     def observe(self, rows: Ints, envs: Ints) -> None:
         """Write the observations of the egos of some trials as those of the environments `envs`."""
@@ -190,7 +202,11 @@ class Fleet:
         Which environments are in a trial that has ended, or in none yet.
     waiting : bool
         Whether there are any such.
+    ahead : int
+        Most trials that are drawn ahead for each; 0: none, so that all trials of a bank begin at once.
     """
+
+    ahead = AHEAD
 
     def __init__(self, settings: Settings, envs: int) -> None:
         self.settings = settings
@@ -245,7 +261,11 @@ class Fleet:
         actions : (E, ...)
             One each, elements of the space of actions.
         """
-        self.settings.actions.put(actions, self.board.arrays["asked"])
+        self._put(actions)
+        self.advance()
+
+    def advance(self) -> None:
+        """Step all environments whose trials have not ended, with the actions on the board."""
         if self._parts is None:
             self._parts = self._grouped(np.flatnonzero(~self.ended).tolist())
         ended = False
@@ -255,6 +275,10 @@ class Fleet:
             self.ended |= self.board.arrays["status"] != STATUS.RUNNING
             self.waiting = bool(self.ended.any())
             self._parts = None
+
+    def _put(self, actions: Any) -> None:
+        """Write the actions of a step onto the board."""
+        self.settings.actions.put(actions, self.board.arrays["asked"])
 
     def seat(self, env: int) -> tuple[Bank, int]:
         """Return the bank and the row in it of an environment's trial.
@@ -320,16 +344,20 @@ class Fleet:
         The first time each gets one trial; afterwards all get some, so that few banks are under way at a time.
         """
         wanted: list[tuple[int, int]] = []
-        first = {env for env in envs if not self._next[env] and not self._ready[env]}
+        first = not self.ahead or any(not self._next[env] and not self._ready[env] for env in envs)
         for env in envs if first else range(len(self)):
-            count = 1 if first else AHEAD
+            count = 1 if first else self.ahead
             missing = count - len(self._ready[env])
             wanted += [(env, self._next[env] + k) for k in range(missing)]
             self._next[env] += max(0, missing)
         drawn = self.settings.episodes.draw([(*self._who[env], episode) for env, episode in wanted])
-        bank = Bank(drawn, self.board, self.settings.layout.cars)
-        for row, (env, _) in enumerate(wanted):
-            self._ready[env].append((bank, row))
+        for (env, _), seat in zip(wanted, self._seated(drawn), strict=True):
+            self._ready[env].append(seat)
+
+    def _seated(self, drawn: Sequence[Instance]) -> list[tuple[Bank, int]]:
+        """Return a bank, and the row in it, for each of some trials."""
+        bank = Bank.of(drawn, self.board, self.settings.layout.cars)
+        return [(bank, row) for row in range(len(drawn))]
 
 
 def masked(envs: int, mask: Any) -> list[int]:

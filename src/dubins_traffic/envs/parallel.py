@@ -7,20 +7,20 @@ from copy import deepcopy
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 from gymnasium import spaces
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv  # pyright: ignore[reportMissingTypeStubs]
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import MultiAgentTrials, Roles
+from dubins_traffic.envs.crew import OF_A_CAR, CrewFleet, Roles, no_agent
 from dubins_traffic.envs.pictures import SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import Pay
-from dubins_traffic.errors import DubinsTrafficError, InputError
+from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.learning.flat import SHOWN
-from dubins_traffic.problem.kinds import KEEP_RULES
 from dubins_traffic.protocols import End
 from dubins_traffic.shield.tables import Overtakes, check_overtakes
 
@@ -57,7 +57,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         Weights of terms that are not as usual: under ``ego`` those of the ego, under ``others`` those of e-agents.
     excuses : bool, str or float
         Whether what one side breaks after the other costs nothing; else each answers for all that it breaks. ``window``
-        or seconds: only what it breaks so soon after the other (`envs.crew.Blame`).
+        or seconds: only what it breaks so soon after the other (`envs.blame`).
     action, frame_skip, cars, levels
         As in `envs.settings.Settings`.
     render_mode : str, optional
@@ -96,21 +96,16 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         height: int = SIDE,
     ) -> None:
         self.settings = Settings(config, "flat", action, frame_skip, None, cars, levels)
-        if self.settings.disturbed and ego is None:
-            value = self.settings.sample.disturbances
-            raise InputError(
-                "no agent", field="disturbances", value=value, expected="none, or an ego's controller"
-            )
         self.render_mode = render_mode
         self._pay = Pay(roles, reward)
         self._renderer = Renderer(render_mode, width, height)
+        roles_of = Roles.of(self.settings, learned, ego, excuses)
+        roles_of.keeps_commands = True
+        self.fleet = CrewFleet(self.settings, 1, roles_of, self._pay)
         self._cars = self.settings.sample.names
         self._ids = [agent_name(car) for car in range(len(self._cars))]
         self.names = dict(zip(self._ids, self._cars, strict=True))
-        self._roles = Roles(
-            _numbers(self.settings.sample, learned, with_ego=ego is None), ego, excuses=excuses
-        )
-        self.possible_agents = [self._ids[car] for car in self._roles.learned]
+        self.possible_agents = [self._ids[car] for car in self.fleet.learned]
         self.agents: list[str] = []
         size = self.settings.layout.size + len(NAMES)
         self.observation_spaces = {
@@ -118,9 +113,8 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         }
         actions = self.settings.actions.space  # of which each agent has its own, seeded by itself
         self.action_spaces = {name: deepcopy(actions) for name in self.possible_agents}
-        self._crew: MultiAgentTrials | None = None
-        self._seed: int | None = None
-        self._episode = 0
+        self.state_space = spaces.Box(-np.inf, np.inf, (OF_A_CAR * len(self._cars),), np.float32)
+        self._seeded = self._begun = False
 
     def observation_space(self, agent: str) -> spaces.Space[Any]:
         """Return the space of an agent's observations: `learning.flat`, then `envs.about_ego.NAMES`."""
@@ -147,8 +141,8 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         """
         for agent in agents:
             if agent not in self.possible_agents:
-                raise _no_agent("shield", agent, self.possible_agents)
-            self._roles.shields[self._ids.index(agent)] = check_overtakes(overtakes)
+                raise no_agent("shield", agent, self.possible_agents)
+            self.fleet.roles.shields[self._ids.index(agent)] = check_overtakes(overtakes)
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -157,55 +151,56 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
 
         Episode k of seed s is trial 4096 k of seed s, as in `envs.single`. Without a seed ever given one is drawn.
         """
-        if seed is not None or self._seed is None:
-            self._seed = int(seeding.np_random(None)[0].integers(2**63)) if seed is None else seed
-            self._episode = int((options or {}).get("episode", 0))
-        (instance,) = self.settings.episodes.draw([(self._seed, 0, self._episode)])
-        if instance.names != self._cars:
-            raise InputError(
-                "trials have other cars",
-                field="e-agents",
-                value=instance.names,
-                expected=", ".join(self._cars),
-            )
-        self._episode += 1
-        self._crew = MultiAgentTrials([instance], self._roles, self.settings)
-        self._pay.begin()
+        if seed is not None or not self._seeded:
+            base_seed = int(seeding.np_random(None)[0].integers(2**63)) if seed is None else seed
+            self.fleet.seed(0, (base_seed, 0), int((options or {}).get("episode", 0)))
+            self._seeded = True
+        self.fleet.begin([0])
+        self._begun = True
         self.agents = list(self.possible_agents)
-        return self._observed(), {name: {"trial": instance} for name in self.agents}
+        return self._observed(), {name: {"trial": self.trial} for name in self.agents}
 
     def step(
         self, actions: Mapping[str, Any]
     ) -> tuple[dict[str, Any], dict[str, float], Flags, Flags, dict[str, dict[str, Any]]]:
         """Hold each agent's action for `frame_skip` ticks; agents without one stand."""
-        crew = self._running()
-        asked = np.zeros((1, crew.group.state.x.shape[1], 2))
-        for name, action in actions.items():
+        self._check_begun()
+        if not self.agents:
+            raise DubinsTrafficError("the episode is over: reset the environment")
+        for name in actions:
             if name not in self.agents:
-                raise _no_agent("action", name, self.agents)
-            asked[0, self._ids.index(name)] = self.settings.actions.commands([action])[0]
-        crew.step(asked, self.settings.frame_skip)
-        ending = crew.group.endings[0]
-        over, terminated = ending is not None, ending is not None and ending.end is not End.DURATION
-        observations = self._observed()
-        rewards: dict[str, float] = {}
-        infos: dict[str, dict[str, Any]] = {}
-        for name in self.agents:
-            rewards[name], infos[name] = self._paid(crew, name)
-        if over:
+                raise no_agent("action", name, self.agents)
+        commands = np.zeros((len(self.agents), 2))
+        if actions:
+            given = [k for k, name in enumerate(self.agents) if name in actions]
+            commands[given] = self.settings.actions.commands([actions[self.agents[k]] for k in given])
+        self.fleet.command(commands)
+        ending = self.fleet.ending(0)
+        ended, terminated = ending is not None, ending is not None and ending.end is not End.DURATION
+        observations, rewards = self._observed(), self.fleet.of_learners("reward")[0].tolist()
+        infos = {name: self._info(name, ended=ended) for name in self.agents}
+        flags = dict.fromkeys(self.agents, False)
+        given = dict(zip(self.agents, rewards, strict=True))
+        if ended:
             self.agents = []
         return (
             observations,
-            rewards,
-            dict.fromkeys(rewards, terminated),
-            dict.fromkeys(rewards, over and not terminated),
+            given,
+            dict.fromkeys(flags, terminated),
+            dict.fromkeys(flags, ended and not terminated),
             infos,
         )
 
+    def state(self) -> npt.NDArray[np.float32]:
+        """Return the state of all cars, for critics that see more than one car does (`envs.crew.CrewFleet.state`)."""
+        self._check_begun()
+        return self.fleet.state[0]
+
     def render(self) -> Image | None:
         """Return the present frame as (H, W, 3) uint8, or show it, as `render_mode` says."""
-        crew = self._begun()
-        return self._renderer.render(crew.group, 0, crew.outlook, 0)
+        self._check_begun()
+        bank, row = self.fleet.seat(0)
+        return self._renderer.render(bank.group, row, bank.outlook, row * bank.group.state.x.shape[1])
 
     def close(self) -> None:
         """Close the page that shows the environment, if there is one."""
@@ -214,40 +209,31 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
     @property
     def trial(self) -> Instance:
         """The instance of this episode, in which learners drive the cars that they do."""
-        return self._begun().group.instances[0]
+        self._check_begun()
+        return self.fleet.instance(0)
 
     @property
     def commands(self) -> Floats:
         """The commands of all cars in each tick of this episode so far, (K, N, 2), m/s and rad/s."""
-        given = self._begun().given
-        cars = len(self._cars)  # the tables of a batch may have more places than the trial has cars
-        return np.array([of_cars[0, :cars] for of_cars in given]).reshape(len(given), cars, 2)
+        self._check_begun()
+        return self.fleet.bank(0).played(self.fleet.seat(0)[1])
 
-    def _paid(self, crew: MultiAgentTrials, name: str) -> tuple[float, dict[str, Any]]:
-        car = self._ids.index(name)
-        reward, info = self._pay.of(crew.terms[0], crew.broken[0], car)
-        first = crew.blame[0].first
-        info["broke_first"] = None if first is None else self._ids[first]
-        if car in self._roles.shields:
-            info["interventions"] = int(crew.stepped_in[0, car])
-        if crew.group.endings[0] is not None:
-            info["trial"] = crew.group.instances[0]
-        return reward, info
+    def _info(self, name: str, *, ended: bool) -> dict[str, Any]:
+        fleet, car = self.fleet, self._ids.index(name)
+        info = self._pay.tell(car, fleet.board.arrays["terms"][car], fleet.board.arrays["weighted"][car])
+        info["broke_first"] = self._ids[fleet.first[0]] if fleet.first[0] >= 0 else None
+        if car in fleet.roles.shields:
+            info["interventions"] = int(fleet.stepped_in[0, car])
+        if ended:
+            info["trial"] = self.trial
+        return info
 
     def _observed(self) -> dict[str, Any]:
-        whole = self._begun().observed[0]
-        return {name: whole[self._ids.index(name)] for name in self.agents}
+        return dict(zip(self.possible_agents, self.fleet.observed[0], strict=True))
 
-    def _begun(self) -> MultiAgentTrials:
-        if self._crew is None:
+    def _check_begun(self) -> None:
+        if not self._begun:
             raise DubinsTrafficError("an environment has to be reset before it is used")
-        return self._crew
-
-    def _running(self) -> MultiAgentTrials:
-        crew = self._begun()
-        if not self.agents:
-            raise DubinsTrafficError("the episode is over: reset the environment")
-        return crew
 
 
 def parallel_env(config: Any, **given: Any) -> TrafficParallelEnv:
@@ -258,29 +244,3 @@ def parallel_env(config: Any, **given: Any) -> TrafficParallelEnv:
 def agent_name(car: int) -> str:
     """Return the name of the agent that drives a car, by the car's number."""
     return f"car_{car}" if car > EGO else f"ego_{EGO}"
-
-
-def _numbers(sample: Instance, learned: Sequence[str] | None, *, with_ego: bool) -> list[int]:
-    """Return the numbers of the cars that learners drive."""
-    names = sample.names
-    for name in learned or ():
-        if name not in names[1:]:
-            raise _no_agent("learned", name, names[1:])
-    cars = [EGO] if with_ego else []
-    for car, agent in enumerate(sample.e_agents, start=1):
-        if learned is None or agent.name in learned:
-            cars.append(car)
-        elif agent.kind not in KEEP_RULES:
-            raise InputError(
-                "an e-agent beside learners",
-                field="e-agents",
-                value=agent.kind,
-                expected=", ".join(sorted(KEEP_RULES)),
-            )
-    if not cars:
-        raise InputError("nobody learns", field="learned", value=learned, expected="at least one car")
-    return cars
-
-
-def _no_agent(field: str, name: str, known: Sequence[str]) -> InputError:
-    return InputError("no such agent", field=field, value=name, expected=", ".join(known) or "none")

@@ -24,6 +24,7 @@ from dubins_traffic.rules.breach_log import RULE
 from dubins_traffic.rules.fault import blamed, in_breach
 from dubins_traffic.rules.label_cache import growth_row
 from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.scoring.counts import RoundCount
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -261,10 +262,7 @@ def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables
     if world.progress.trial[b].tick > tick:
         steps.stride[b].left -= 1
         count_tick(b, e, outlook, steps)
-        early = world.tally.early[b]
-        if early.goals != goals or early.rounds != rounds:
-            each = 1.0 / max(1, outlook.trial[b].last_goal - outlook.trial[b].first_goal)
-            steps.terms[e, TERM.EARLY] += (early.rounds - rounds) + (early.goals - goals) * each
+        count_early(e, b, rounds, goals, world.tally.early[b], outlook, steps)
         _charge(e, breaches, contacts, world, steps)
         sweep(b, tick + 1, outlook)
     return world.progress.trial[b].status
@@ -273,16 +271,45 @@ def _tick(b: int, e: int, commands: Floats, world: World, outlook: OutlookTables
 @jit_inline
 def _close(b: int, e: int, outlook: OutlookTables, steps: StepTables) -> None:
     """Compute the reward of a step, and observe."""
-    stride, total, owed = steps.stride[b], 0.0, 0.0
+    pay(b, e, steps.weights, steps.debts, steps)
+    write_flat(b, EGO, steps.flat[e], outlook)
+
+
+@jit_inline
+def pay(row: int, e: int, weights: Floats, debts: Floats, steps: StepTables) -> None:
+    """Compute the reward of the car in a `row` (row) for a step, from its terms in row `e` (row).
+
+    `weights` (T,) and `debts` (T,) are those of each term.
+    """
+    stride, total, owed = steps.stride[row], 0.0, 0.0
     share = worth(stride.debt)
-    for j in range(steps.weights.shape[0]):
-        weighted = steps.weights[j] * steps.terms[e, j] * (share if j <= TERM.PROGRESS else 1.0)
+    for j in range(weights.shape[0]):
+        weighted = weights[j] * steps.terms[e, j] * (share if j <= TERM.PROGRESS else 1.0)
         steps.weighted[e, j] = weighted
         total += weighted
-        owed += steps.debts[j] * steps.terms[e, j]
+        owed += debts[j] * steps.terms[e, j]
     stride.owed = owed
     steps.reward[e] = total
-    write_flat(b, EGO, steps.flat[e], outlook)
+
+
+@jit_inline
+def count_early(
+    e: int, row: int, rounds: int, goals: int, early: RoundCount, outlook: OutlookTables, steps: StepTables
+) -> None:
+    """Count what a tick has added to the rounds before the ego's first breach, as a term.
+
+    Parameters
+    ----------
+    e : int
+        The row of the term.
+    row : int
+        The ego's row of `outlook`.
+    rounds, goals : int
+        Number of rounds, and of goals in the next one, before that tick; `early` has those of now.
+    """
+    if early.goals != goals or early.rounds != rounds:
+        each = 1.0 / max(1, outlook.trial[row].last_goal - outlook.trial[row].first_goal)
+        steps.terms[e, TERM.EARLY] += (early.rounds - rounds) + (early.goals - goals) * each
 
 
 @jit_inline
@@ -340,16 +367,19 @@ def _charge(e: int, breaches: int, contacts: int, world: World, steps: StepTable
     for k in range(contacts, work.found[0]):
         if work.contact[k].car == EGO or work.contact[k].other == EGO:
             steps.terms[e, TERM.BREACHES + steps.cost_of[RULE.COLLISION]] += 1.0
-            steps.terms[e, TERM.BREACHES + AT_FAULT] += 1.0 if _guilty(k, world) else 0.0
+            steps.terms[e, TERM.BREACHES + AT_FAULT] += 1.0 if is_guilty(k, EGO, world) else 0.0
 
 
 @jit
-def _guilty(k: int, world: World) -> bool:
-    """Tell whether the ego is at fault in contact k, as `rules.fault.with_fault_by` does."""
+def is_guilty(k: int, n: int, world: World) -> bool:
+    """Tell whether car `n` (index) is at fault in its contact `k` (index) of those found in `world` (trials).
+
+    It does as `rules.fault.with_fault_by`.
+    """
     contact, note = world.work.contact[k], world.progress.contact[k]
     if contact.other < 0:
         return contact.moved != 0
     first = contact.moved != 0 and contact.closing > 0.0
     second = contact.other_moved != 0 and contact.other_closing > 0.0
     guilty, other_guilty = _blamed(first, second, _in_breach(note.bits), _in_breach(note.other_bits))
-    return guilty if contact.car == EGO else other_guilty
+    return guilty if contact.car == n else other_guilty

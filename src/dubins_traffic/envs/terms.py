@@ -43,7 +43,10 @@ class _Term(NamedTuple):
     LEFT: int = 7
     CROSSING: int = 8
     BREACHES: int = 9
-    """The first of the terms that are costs."""
+    """The first of the terms that are costs, and, of several learners, of `PARTS`."""
+    SPOILED: int = BREACHES + len(PARTS)
+    VIOLATED: int = SPOILED + 1
+    """The last two are those of adversaries alone."""
 
 
 TERM: Final = _Term()
@@ -166,12 +169,12 @@ PEERS_DEBTS: Final[Mapping[str, float]] = {
     "E2": DEBTS["at_fault"],
 }
 """What a unit of each term, or a breach of its part of the assumption, adds to the debt of a peer."""
-_FIRST: Final = len(COSTS)
-"""The first of `PARTS` that an e-agent may break."""
+PAID: Final = (*TERMS, *ASSUMPTIONS, "spoiled", "violated")
+"""All that a car among several learners may be paid for, by number."""
 
 
 class Pay:
-    """Computes the reward of each car of a crew in a step.
+    """The weights of all that is paid for, `PAID`, and what a unit of each adds to a debt, by role.
 
     Parameters
     ----------
@@ -179,6 +182,11 @@ class Pay:
         What e-agents are: ``adversaries`` or ``peers``.
     reward : mapping, optional
         Weights of terms that are not as usual: under ``ego`` those of the ego, under ``others`` those of e-agents.
+
+    Attributes
+    ----------
+    weights, debts : (2, T)
+        Of the ego, and of e-agents.
     """
 
     def __init__(self, role: str, reward: Mapping[str, Mapping[str, float]] | None = None) -> None:
@@ -188,49 +196,36 @@ class Pay:
         unknown = given.keys() - {"ego", "others"}
         if unknown:
             raise InputError("not rewards", field="reward", value=sorted(unknown)[0], expected="ego, others")
-        self._ego, self._debts = weights_of(given.get("ego"))
-        self._spoils = role == "adversaries"
-        usual = ROLES[role] if self._spoils else {**ROLES[role], DEBT: 1.0}
-        self._others = _weighted(usual, given.get("others", {}), "reward.others")
-        self._owed = self._others.pop(DEBT, 0.0)
-        self.begin()
+        self.weights, self.debts = np.zeros((2, len(PAID))), np.zeros((2, len(PAID)))
+        self.weights[0, : len(TERMS)], self.debts[0, : len(TERMS)] = weights_of(given.get("ego"))
+        usual = ROLES[role] if role == "adversaries" else {**ROLES[role], DEBT: 1.0}
+        others = _weighted(usual, given.get("others", {}), "reward.others")
+        owed = others.pop(DEBT, 0.0)
+        self._terms = TERMS, tuple(others)
+        for k, name in enumerate(PAID):
+            self.weights[1, k] = others.get(name, 0.0)
+            self.debts[1, k] = owed * PEERS_DEBTS.get(name, 0.0)
 
-    def begin(self) -> None:
-        """Begin a trial: nobody has a debt."""
-        self._debt: dict[int, float] = {}
+    def tell(self, car: int, terms: Floats, weighted: Floats) -> dict[str, Any]:
+        """Return what the info of a step says of a car: its terms with their weights, its costs, and their sum.
 
-    def of(self, terms: Floats, broken: Ints, car: int) -> tuple[float, dict[str, Any]]:
-        """Return the reward of a car in the last step of its trial, and what it says of it: its terms, and costs.
-
-        Call it once a step for each car.
-
-        Parameters
-        ----------
-        terms : (N, T)
-            The terms of each car, but for breaches.
-        broken : (N, P)
-            How often each car has broken each of `PARTS`, where that counts.
+        `terms` (T,) are all of `PAID`, `weighted` (T,) the same with weights.
         """
-        debt = self._debt.get(car, 0.0)
-        share = worth(debt)
-        if car == EGO:
-            costly: Floats = broken[EGO, :_FIRST].astype(np.float64)
-            of_ego = np.concatenate([terms[EGO, : TERM.BREACHES], costly])
-            self._debt[car] = debt + float(of_ego @ self._debts)
-            of_ego[: EARNED.stop] *= share
-            weighted: list[float] = (of_ego * self._ego).tolist()
-            told = {"reward_terms": dict(zip(TERMS, weighted, strict=True)), "cost": float(cost_of(costly))}
-            return sum(weighted), told | {"costs": dict(zip(COSTS, costly.tolist(), strict=True))}
-        parts = dict(zip(ASSUMPTIONS, map(float, broken[car, _FIRST:]), strict=True))
-        done = dict(zip(TERMS[: TERM.BREACHES], terms[car, : TERM.BREACHES].tolist(), strict=True))
-        self._debt[car] = debt + self._owed * sum(
-            each * {**done, **parts}[name] for name, each in PEERS_DEBTS.items()
-        )
-        for k in EARNED:
-            done[TERMS[k]] *= share
-        if self._spoils:
-            done["spoiled"] = -float(sum(terms[EGO, k] * self._ego[k] for k in EARNED))
-            done["violated"] = float(broken[EGO, :AT_FAULT].sum())
-        terms_of_car = {name: weight * {**done, **parts}[name] for name, weight in self._others.items()}
-        told = {"reward_terms": terms_of_car, "cost": sum(parts.values()), "costs": parts}
-        return sum(terms_of_car.values()), told
+        names, counted = (_OF_EGO, _COUNTED) if car == EGO else (_OF_OTHERS, _OF_OTHERS)
+        done, broken = weighted.tolist(), terms.tolist()
+        return {
+            "reward_terms": {name: done[_PLACES[name]] for name in self._terms[min(car, 1)]},
+            "cost": float(sum([broken[k] for k in counted])),
+            "costs": {PAID[k]: broken[k] for k in names},
+        }
+
+
+_PLACES: Final = {name: k for k, name in enumerate(PAID)}
+_OF_EGO: Final = range(TERM.BREACHES, len(TERMS))
+_OF_OTHERS: Final = range(len(TERMS), len(TERMS) + len(ASSUMPTIONS))
+_COUNTED: Final = tuple(TERM.BREACHES + k for k in COUNTED)
+
+
+def costs_of(terms: Floats, *, ego: bool) -> Floats:
+    """Return the one cost of rows of `PAID`, (..., T), of an ego or of an e-agent, (...)."""
+    return terms[..., list(_COUNTED if ego else _OF_OTHERS)].sum(axis=-1)
