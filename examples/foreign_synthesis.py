@@ -1,8 +1,9 @@
 """From our game to a foreign tool and back on the road, in one script; docs/foreign-strategies.md tells the steps.
 
     python examples/foreign_synthesis.py --tulip path/to/the/python/that/has/tulip
+    python examples/foreign_synthesis.py --spot path/to/the/python/that/has/spot
 
-TuLiP, with omega and dd, is the tool here. It is run by its own Python, since it wants packages of other versions.
+TuLiP, with omega and dd, is the tool, or Spot. It is run by its own Python, since it wants packages of other versions.
 Prints what it has found, and the score of three minutes on the road.
 """
 
@@ -57,16 +58,21 @@ def main() -> None:
     """Write the game, have it solved, drive the strategy."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
     parser.add_argument("--tulip", default=sys.executable, help="the Python that has TuLiP")
-    tulip = parser.parse_args().tulip
+    parser.add_argument("--spot", help="the Python that has Spot, which then is the tool")
+    asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        square, first, game, strategy = (
-            str(folder / file) for file in ("square.json", "first.json", "game.py", "strategy.py")
-        )
+        square, first = str(folder / "square.json"), str(folder / "first.json")
         Path(square).write_text(json.dumps(SQUARE))
         command("instance", square, "--seed", "1", "--full", "-o", first)
+        if asked.spot:
+            game, strategy = str(folder / "game.tlsf"), str(folder / "strategy.hoa")
+            tool, solve = "Spot", [asked.spot, str(Path(__file__).with_name("spot_solve.py"))]
+        else:
+            game, strategy = str(folder / "game.py"), str(folder / "strategy.py")
+            tool, solve = "TuLiP", [asked.tulip, "-c", SOLVE]
         print(command("synth", first, "--spec", game).splitlines()[0])
-        print("TuLiP finds a strategy of", run(tulip, "-c", SOLVE, game, strategy).splitlines()[-1])
+        print(tool, "finds a strategy of", run(*solve, game, strategy).splitlines()[-1])
         (score,) = json.loads(command("run", first, "--controller", strategy, "--json"))["trials"]
         print(f"on the road: {score['verdict']['verdict']}, {score['rounds']} rounds")
 

@@ -85,6 +85,11 @@ CLAIMS: Mapping[str, Claim] = {
         "theory.md",
         "some minutes",
     ),
+    "solvers": Claim(
+        "TuLiP, omega and Spot find our winners in the smallest games of `synthesis-2026`, where they find any in a minute",
+        "foreign-strategies.md",
+        "half an hour",
+    ),
     "synthesized": Claim(
         "on the road `synthesized` visits its goals again and again and breaks nothing",
         "theory.md#a-strategy-on-the-road",

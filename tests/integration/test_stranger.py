@@ -79,3 +79,7 @@ def test_the_path_of_a_stranger(tmp_path: Path) -> None:
     assert game.startswith("1 e-agent, 16 cells")
     assert found.startswith("TuLiP finds a strategy of ")
     assert road.startswith("on the road: satisfied, ")
+    told = done([where[0], example, "--spot", interpreter_with("spot")], tmp_path, around)
+    _, found, road = told.splitlines()
+    assert found.startswith("Spot finds a strategy of ")
+    assert road.startswith("on the road: satisfied, ")
