@@ -86,7 +86,7 @@ CLAIMS: Mapping[str, Claim] = {
         "some minutes",
     ),
     "solvers": Claim(
-        "TuLiP, omega and Spot find our winners in the smallest games of `synthesis-2026`, where they find any in a minute",
+        "TuLiP, omega and Spot find our winners in the smallest games of `synthesis-2026`, where they end in a minute",
         "foreign-strategies.md",
         "half an hour",
     ),

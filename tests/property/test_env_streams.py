@@ -150,3 +150,37 @@ def test_an_episode_is_the_trial_that_it_cites(
     ):
         assert np.array_equal(getattr(told, name)[skip::skip], np.array([own[place] for own in frames])), name
     assert player.seen[::skip] == seens[:-1]
+
+
+@pytest.mark.parametrize("mode", list(AutoresetMode))
+def test_staggered_environments_run_the_same_trials_and_end_at_different_times(mode: AutoresetMode) -> None:
+    """The first episode is that of before up to where it is cut, and the second is the next trial, whole."""
+    plain, few, many = (vector(envs, autoreset_mode=mode, staggered=own) for envs, own in
+                        ((20, False), (5, True), (20, True)))  # fmt: skip
+    seen = [env.reset(seed=11)[0] for env in (plain, few, many)]
+    assert np.array_equal(seen[0], seen[2])
+    first, cut_at = np.ones(20, dtype=bool), np.full(20, -1)
+    for step in range(STEPS):
+        actions = np.stack([weaving(step, k) for k in range(20)])
+        if mode is AutoresetMode.DISABLED:
+            for env, envs in ((plain, 20), (few, 5), (many, 20)):
+                if env.fleet.ended.any():
+                    env.reset(options={"reset_mask": env.fleet.ended[:envs].copy()})
+        own = plain.step(actions)
+        part, whole = few.step(actions[:5]), many.step(actions)
+        for k in range(4):
+            assert np.array_equal(part[k], whole[k][:5])
+        over = whole[2] | whole[3]
+        same = first & ~(over & (own[2] | own[3] | over)) & ~(own[2] | own[3])
+        assert np.array_equal(own[1][same], whole[1][same])
+        assert np.array_equal(own[0][same], whole[0][same])
+        for k in np.flatnonzero(over & first):
+            ended = whole[4]["final_info"] if mode is AutoresetMode.SAME_STEP else whole[4]
+            is_cut = not (own[2] | own[3])[k]
+            assert is_cut == ("outcome" not in ended or ended["outcome"][k] is None)
+            assert not is_cut or (whole[3][k] and not whole[2][k])
+            cut_at[k] = step
+        first &= ~(over | own[2] | own[3])
+    assert len(set(cut_at.tolist())) >= 12
+    assert [many.fleet.instance(k).trial % 4096 for k in range(20)] == list(range(20))
+    assert min(many.fleet.instance(k).trial for k in range(20)) >= 4096

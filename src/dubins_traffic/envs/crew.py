@@ -266,7 +266,7 @@ class CrewFleet(Fleet):
             "weights": pay.weights, "debts": pay.debts, "told": self.told, "first": self.first,
         }  # fmt: skip
         if roles.ego is not None and (settings.disturbed or not Egos(roles.ego).is_compiled):
-            self.ahead = 0  # whoever asks egos in a bank asks those of all its trials
+            self.draws_ahead = False  # whoever asks egos in a bank asks those of all its trials
 
     def _put(self, actions: Any) -> None:
         """Write the commands of the actions of all learners, (E, A, ...), onto the board."""

@@ -182,6 +182,10 @@ class Bank:
 
 AHEAD: Final = 4
 """Most trials that are drawn ahead for each environment."""
+TOGETHER: Final = 16
+"""So many trials that are drawn ahead make a bank: more would take long at once, and fewer would make many banks."""
+AT_ONCE: Final = 4
+"""For so many environments are trials drawn ahead in a step."""
 
 
 class Fleet:
@@ -202,11 +206,14 @@ class Fleet:
         Which environments are in a trial that has ended, or in none yet.
     waiting : bool
         Whether there are any such.
-    ahead : int
-        Most trials that are drawn ahead for each; 0: none, so that all trials of a bank begin at once.
+    draws_ahead : bool
+        Whether next trials are drawn while others run; else all trials of a bank begin at once.
+    is_eager : bool
+        Whether trials are drawn ahead from the first ones of a seed on, not only once these have ended.
     """
 
-    ahead = AHEAD
+    is_eager = False
+    draws_ahead = True
 
     def __init__(self, settings: Settings, envs: int) -> None:
         self.settings = settings
@@ -215,7 +222,10 @@ class Fleet:
         self.waiting = True
         self._who: list[tuple[int, int]] = [(0, env) for env in range(envs)]
         self._next = [0] * envs
+        self._is_fresh = [True] * envs
         self._ready: list[deque[tuple[Bank, int]]] = [deque() for _ in range(envs)]
+        self._lacking: deque[int] = deque()
+        self._drawn: list[tuple[int, Instance]] = []
         self._seats: list[tuple[Bank, int] | None] = [None] * envs
         self._parts: list[tuple[Bank, Ints, Ints]] | None = None
         self._shield: Overtakes | None = None
@@ -227,7 +237,9 @@ class Fleet:
         """Let the next trial of an environment be `episode` of `who`: a base seed, and a number under it."""
         check_numbers(who[0], 0)
         self._who[env], self._next[env] = who, episode
+        self._is_fresh[env] = True
         self._ready[env].clear()
+        self._drawn = [own for own in self._drawn if own[0] != env]
 
     def keep(self, shield: Overtakes) -> None:
         """Keep all egos under shields from their next trials on, which may cross the centre line when `shield` says."""
@@ -239,9 +251,15 @@ class Fleet:
         """Begin the next trials of environments, and observe their first frames."""
         some = list(envs)
         if any(not self._ready[env] for env in some):
-            self._fill(some)
+            self._seat()
+            self._draw([env for env in some if not self._ready[env]], 1)
+            self._seat()
         for env in some:
             bank, row = self._seats[env] = self._ready[env].popleft()
+            # Who has seeded environments may well run one episode of each, and seed them anew.
+            if not self._ready[env] and (self.is_eager or not self._is_fresh[env]):
+                self._lacking.append(env)
+            self._is_fresh[env] = False
             if self.settings.formulas:
                 bank.watch(row, self.settings.formulas)
             if self.settings.disturbed or self._shield is not None:
@@ -275,6 +293,17 @@ class Fleet:
             self.ended |= self.board.arrays["status"] != STATUS.RUNNING
             self.waiting = bool(self.ended.any())
             self._parts = None
+        if self._lacking and self.draws_ahead:
+            self._prepare()
+
+    def expect(self, envs: Sequence[int]) -> None:
+        """Draw the next trials of environments in this order, in which their episodes are going to end."""
+        self._lacking = deque(envs)
+
+    def cut(self, envs: Sequence[int]) -> None:
+        """End the episodes of environments, though their trials have not ended."""
+        self.ended[envs] = self.waiting = True
+        self._parts = None
 
     def _put(self, actions: Any) -> None:
         """Write the actions of a step onto the board."""
@@ -338,21 +367,29 @@ class Fleet:
             places.append(env)
         return [(bank, np.array(rows), np.array(places)) for bank, rows, places in found.values()]
 
-    def _fill(self, envs: Sequence[int]) -> None:
-        """Draw trials ahead for environments that have none, and for others together with them.
+    def _prepare(self) -> None:
+        """Draw next trials of some environments that have none; put them into a bank once there are enough."""
+        each = max(1, min(AHEAD, TOGETHER // len(self)))
+        some = dict.fromkeys(self._lacking.popleft() for _ in range(min(AT_ONCE, len(self._lacking))))
+        self._draw([env for env in some if not self._ready[env]], each)
+        if len(self._drawn) >= min(TOGETHER, each * len(self)):
+            self._seat()
 
-        The first time each gets one trial; afterwards all get some, so that few banks are under way at a time.
-        """
-        wanted: list[tuple[int, int]] = []
-        first = not self.ahead or any(not self._next[env] and not self._ready[env] for env in envs)
-        for env in envs if first else range(len(self)):
-            count = 1 if first else self.ahead
-            missing = count - len(self._ready[env])
-            wanted += [(env, self._next[env] + k) for k in range(missing)]
-            self._next[env] += max(0, missing)
+    def _draw(self, envs: Sequence[int], each: int) -> None:
+        """Draw the next trials of environments, `each` of every one."""
+        wanted = [(env, self._next[env] + k) for env in envs for k in range(each)]
+        for env in envs:
+            self._next[env] += each
         drawn = self.settings.episodes.draw([(*self._who[env], episode) for env, episode in wanted])
-        for (env, _), seat in zip(wanted, self._seated(drawn), strict=True):
-            self._ready[env].append(seat)
+        self._drawn += zip([env for env, _ in wanted], drawn, strict=True)
+
+    def _seat(self) -> None:
+        """Put all trials that have been drawn into a bank, in which they wait."""
+        if self._drawn:
+            seats = self._seated([instance for _, instance in self._drawn])
+            for (env, _), seat in zip(self._drawn, seats, strict=True):
+                self._ready[env].append(seat)
+            self._drawn = []
 
     def _seated(self, drawn: Sequence[Instance]) -> list[tuple[Bank, int]]:
         """Return a bank, and the row in it, for each of some trials."""

@@ -30,6 +30,8 @@ Bools = npt.NDArray[np.bool_]
 VECTORIZED: Final = ("flat", "dict")
 TOGETHER: Final = ("close", "reset", "step")
 """What is done to all environments at once."""
+GOLDEN: Final = 0.6180339887498949
+"""Shares of its multiples are spread evenly, however many there are."""
 
 
 class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
@@ -52,6 +54,9 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         When an environment whose episode is over begins the next one: in the next step, which then only does that; in
         the same step, with the last observation and info in ``info["final_obs"]`` and ``info["final_info"]``; or when
         it is reset, by ``options["reset_mask"]``.
+    staggered : bool
+        Whether the first episodes after a seed are cut, truncated and without an outcome, each at another place, so
+        that later ones do not all end and begin in the same step.
     render_mode : str, optional
         ``rgb_array``.
     width, height : int
@@ -78,6 +83,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         levels: Levels | Mapping[str, Any] | int | None = None,
         formulas: Mapping[str, str] | None = None,
         autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
+        staggered: bool = False,
         render_mode: str | None = None,
         width: int = SIDE,
         height: int = SIDE,
@@ -108,6 +114,8 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         self._seeded = False
         self._nothing = np.zeros(num_envs, dtype=np.bool_)
         self._infos = StepInfo(num_envs)
+        self._staggered = self.fleet.is_eager = staggered
+        self._left = np.full(num_envs, -1)
 
     def reset(  # pyright: ignore[reportIncompatibleMethodOverride]
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
@@ -134,6 +142,9 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
                 self.fleet.seed(env, who[env], given.get("episode", 0))
             self._seeded = True
         self.fleet.begin(some)
+        if seed is not None and self._staggered:
+            self._left[some] = [self._cut_after(env) for env in some]
+            self.fleet.expect(sorted(some, key=lambda env: self._left[env]))
         return self._observed(), self._begun(some) | self._states()
 
     def render(self) -> tuple[Any, ...] | None:
@@ -149,6 +160,8 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         if waiting is not self._nothing and not self._seeded:
             raise DubinsTrafficError("the environments have to be reset before they are stepped")
         fleet.step(actions)
+        if self._staggered:
+            self._cut()
         if waiting is not self._nothing:
             for name in ("reward", "terms", "weighted"):
                 board[name][waiting] = 0.0
@@ -160,7 +173,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         ended: list[int] = np.flatnonzero(over).tolist()
         terminated = self._nothing.copy()
         terminated[ended] = [fleet.is_terminal(env) for env in ended]
-        last = self._ended(ended)
+        last = self._ended([env for env in ended if fleet.ending(env) is not None])
         if waiting.any():
             info |= self._restarted(waiting) | self._states()
         if ended and self.autoreset_mode is AutoresetMode.SAME_STEP:
@@ -200,6 +213,19 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
     def commands(self, actions: Any) -> Floats:
         """Return the commands, (K, 2), speed in m/s and yaw rate in rad/s, of each tick of one environment's steps."""
         return np.repeat(self.settings.actions.commands(actions), self.settings.frame_skip, axis=0)
+
+    def _cut_after(self, env: int) -> int:
+        """Return after how many steps the first episode of an environment is cut: evenly spread shares, 0 the whole."""
+        steps = -(-self.fleet.instance(env).ticks // self.settings.frame_skip)
+        return int(steps * (1.0 - env * GOLDEN % 1.0))
+
+    def _cut(self) -> None:
+        """Cut first episodes whose turn it is."""
+        self._left -= self._left > 0
+        turn = (self._left == 0) & ~self.fleet.ended
+        self._left[self._left == 0] = -1
+        if turn.any():
+            self.fleet.cut(np.flatnonzero(turn).tolist())
 
     def _restarted(self, waiting: Bools) -> dict[str, Any]:
         """Begin the next episodes of the environments whose last one was over before this step."""
