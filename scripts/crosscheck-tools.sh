@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # Installs the tools with which some tests compare, each in an environment of its own in build/crosscheck:
 # Spot, stormpy (carries another Spot), rtamt, TuLiP, ltlf2dfa, omega with dd, SUMO, commonroad-io, Lanelet2, rclpy of two
-# versions of ROS 2 with Fast DDS; and Debian's spin and mona.
+# versions of ROS 2 with Fast DDS, RVO2 and CasADi; and Debian's spin and mona.
 # With the argument `acacia` Acacia-Bonsai as well, which wants Python 3.13. What is there already is left alone.
 # Where something can't be installed it says so in one line; the status is 0 either way.
 # Two are installed at a time, by the pip of .venv: to put one into each environment takes longer than most of the tools.
@@ -45,6 +45,9 @@ environment rtamt rtamt 'rtamt==0.4.10' setuptools
 # Its optimizers alone, which run in .venv: what else it needs is there.
 environment psytaliro ppft --no-deps 'psy-taliro==3.2.0' 'pybanquo==0.1.1' 'pathos==0.3.5' 'ppft==1.7.8' 'dill==0.4.1' \
   'attrs>=24.1' 'sortedcontainers~=2.4'
+# The libraries of methods of others, which run in .venv as well.
+environment baselines pyrvo --no-deps -r experiments/baselines/orca/constraints.txt \
+  -r experiments/baselines/mpc/constraints.txt
 environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
 environment omega dd.cudd,omega.games.gr1 'omega==0.4.0' 'dd==0.6.0' setuptools
 environment jazzy rclpy 'ros-rclpy~=7.1.6' 'ros-rmw-fastrtps-cpp~=8.4' 'ros-nav-msgs~=5.3'

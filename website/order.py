@@ -29,7 +29,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
         "sandbox",
         "gazebo",
     ),
-    "Evaluate": ("tutorials/campaign", "campaigns", "batches", "suites", "results", "falsify", "records"),
+    "Evaluate": ("tutorials/campaign", "campaigns", "batches", "suites", "baselines", "results", "falsify", "records"),
     "Compete": ("tutorials/competition", "competitions/participants", "competitions/organisers"),
     "Reference": (
         "glossary",

@@ -11,8 +11,8 @@ import pytest
 from benchmarks.batch import configuration
 
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.envs.crew import OF_A_CAR
-from dubins_traffic.envs.parallel import agent_name, parallel_env
+from dubins_traffic.envs.crew import OF_A_CAR, agent_name
+from dubins_traffic.envs.parallel import parallel_env
 from dubins_traffic.envs.parallel_vector import TrafficParallelVectorEnv
 from dubins_traffic.envs.shielded import Shielded
 from dubins_traffic.envs.vector import TrafficVectorEnv

@@ -93,6 +93,11 @@ class Roles:
         return Roles(cars, ego, excuses=excuses)
 
 
+def agent_name(car: int) -> str:
+    """Return the name of the agent that drives a car, by the car's number."""
+    return f"car_{car}" if car > EGO else f"ego_{EGO}"
+
+
 def no_agent(field: str, name: str, known: Sequence[str]) -> InputError:
     """Return the error of a name that is not among the `known`."""
     return InputError("no such agent", field=field, value=name, expected=", ".join(known) or "none")

@@ -12,9 +12,8 @@ from gymnasium import spaces
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv  # pyright: ignore[reportMissingTypeStubs]
 
-from dubins_traffic.cars.state import EGO
 from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import OF_A_CAR, CrewFleet, Roles, no_agent
+from dubins_traffic.envs.crew import OF_A_CAR, CrewFleet, Roles, agent_name, no_agent
 from dubins_traffic.envs.pictures import SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import Pay
@@ -239,8 +238,3 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
 def parallel_env(config: Any, **given: Any) -> TrafficParallelEnv:
     """Return a `TrafficParallelEnv`, under PettingZoo's name for it."""
     return TrafficParallelEnv(config, **given)
-
-
-def agent_name(car: int) -> str:
-    """Return the name of the agent that drives a car, by the car's number."""
-    return f"car_{car}" if car > EGO else f"ego_{EGO}"

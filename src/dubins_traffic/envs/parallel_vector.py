@@ -11,9 +11,8 @@ from gymnasium import spaces
 from gymnasium.utils import seeding
 
 from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import OF_A_CAR, CrewFleet, Roles, no_agent
+from dubins_traffic.envs.crew import OF_A_CAR, CrewFleet, Roles, agent_name, no_agent
 from dubins_traffic.envs.episodes import seeds_of
-from dubins_traffic.envs.parallel import agent_name
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import PAID, Pay, costs_of
 from dubins_traffic.errors import DubinsTrafficError, InputError

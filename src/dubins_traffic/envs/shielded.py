@@ -9,7 +9,8 @@ from pettingzoo import ParallelEnv  # pyright: ignore[reportMissingTypeStubs]
 from pettingzoo.utils import BaseParallelWrapper  # pyright: ignore[reportMissingTypeStubs]
 
 from dubins_traffic.cars.state import EGO
-from dubins_traffic.envs.parallel import TrafficParallelEnv, agent_name
+from dubins_traffic.envs.crew import agent_name
+from dubins_traffic.envs.parallel import TrafficParallelEnv
 from dubins_traffic.errors import InputError
 from dubins_traffic.shield.tables import Overtakes
 
