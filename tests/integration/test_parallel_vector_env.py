@@ -119,7 +119,7 @@ def test_what_makes_no_sense_is_named() -> None:
     with pytest.raises(InputError, match="shields: no such agent: got 'car_9'"):
         TrafficParallelVectorEnv(1, config(), shields={"car_9": "sure"})
     with pytest.raises(InputError, match="overtakes: not a way to overtake"):
-        TrafficParallelVectorEnv(1, config(), shields={"car_1": "often"})  # pyright: ignore[reportArgumentType]
+        TrafficParallelVectorEnv(1, config(), shields={"car_1": "often"})
     env = TrafficParallelVectorEnv(2, config())
     with pytest.raises(DubinsTrafficError, match="have to be reset"):
         env.step(np.zeros((2, 4, 2)))

@@ -19,7 +19,7 @@ from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.learning.flat import SHOWN
 from dubins_traffic.protocols import End
-from dubins_traffic.shield.tables import Overtakes, check_overtakes
+from dubins_traffic.shield.tables import check_overtakes
 
 if TYPE_CHECKING:
     import os
@@ -70,7 +70,7 @@ class TrafficParallelVectorEnv:
         learned: Sequence[str] | None = None,
         reward: Mapping[str, Mapping[str, float]] | None = None,
         excuses: bool | str | float = True,
-        shields: Mapping[str, Overtakes] | None = None,
+        shields: Mapping[str, str] | None = None,
         action: str = "continuous",
         frame_skip: int = 1,
         cars: int = SHOWN,
