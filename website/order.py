@@ -29,7 +29,16 @@ SECTIONS: dict[str, tuple[str, ...]] = {
         "sandbox",
         "gazebo",
     ),
-    "Evaluate": ("tutorials/campaign", "campaigns", "batches", "suites", "baselines", "results", "falsify", "records"),
+    "Evaluate": (
+        "tutorials/campaign",
+        "campaigns",
+        "batches",
+        "suites",
+        "baselines",
+        "results",
+        "falsify",
+        "records",
+    ),
     "Compete": ("tutorials/competition", "competitions/participants", "competitions/organisers"),
     "Reference": (
         "glossary",

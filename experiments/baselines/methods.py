@@ -1,0 +1,56 @@
+"""The methods: what drives, what it assumes, and what it needs beside this package."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+HERE: Final = Path(__file__).parent
+_LEARNED: Final = HERE.parents[1] / "examples" / "learning"
+
+
+@dataclass(frozen=True, slots=True)
+class Method:
+    """A method: its name on the page, the controller, and what there is to say about it in a sentence."""
+
+    title: str
+    controller: str
+    says: str
+    needs: str = ""
+    """The library that it needs, as in its `constraints.txt`; none for most."""
+
+
+def _of(folder: str, name: str) -> str:
+    return f"experiments.baselines.{folder}.controller:{name}"
+
+
+METHODS: Final[Mapping[str, Method]] = {
+    "simple": Method("`simple`", "simple", "straight across country from goal to goal, as in 2016"),
+    "lanes": Method("`lanes`", "lanes", "keeps to its lane and behind others, and overtakes; stops nowhere"),
+    "rules": Method("`rules`", "rules", "keeps all the rules, by construction"),
+    "potential": Method(
+        "potential field", _of("potential", "Potential"), "pulled along the lane, pushed away by cars"
+    ),
+    "orca": Method(
+        "ORCA", _of("orca", "Orca"), "the velocity nearest to the lane's that meets nobody", "pyrvo"
+    ),
+    "mpc": Method(
+        "model predictive control", _of("mpc", "Mpc"), "tracks the lane for two seconds ahead, clear of others",
+        "casadi",
+    ),
+    "cloning": Method(
+        "cloned from `rules`", str(_LEARNED / "junction.npz"), "DAgger on `junction`, a network of 96 and 48"
+    ),
+    "evolved": Method(
+        "evolution strategy", str(_LEARNED / "town.npz"), "on `town`, by the return of earlier environments"
+    ),
+    "ppo": Method(
+        "PPO", str(HERE / "ppo" / "ppo.npz"), "on `junction`, with the default reward; the median of three seeds"
+    ),
+    "ppo-shielded": Method(
+        "PPO, taught under the shield", str(HERE / "ppo" / "shielded.npz"),
+        "the same, and the shield was there while it learned; the median of three seeds",
+    ),
+}  # fmt: skip

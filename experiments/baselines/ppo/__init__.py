@@ -1,0 +1,1 @@
+"""PPO, and PPO with a Lagrange multiplier; README.md says what it assumes."""

@@ -1,0 +1,78 @@
+"""Known methods on the ranked suites: the page says what is stored, and what is stored comes again."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import pytest
+from experiments.baselines.measuring import SHIELD, SUITES, instances_of, run
+from experiments.baselines.methods import METHODS
+from experiments.baselines.page import DOCS, PICTURE, SEEDS, page, stored
+
+from dubins_traffic.engine.batch import run_batch
+from tests import tools
+
+EXACT = frozenset({"simple", "lanes", "rules", "potential", "orca"})
+"""Those of which each processor finds the same bits; products of matrices, and IPOPT, may end in others."""
+SHARE = 20
+"""Of so many trials one is run again."""
+
+
+def test_the_page_is_made_of_what_is_stored() -> None:
+    assert (DOCS / "baselines.md").read_text(encoding="utf-8") == page()
+    assert PICTURE.is_file()
+    assert stored().keys() == METHODS.keys()
+    for own in stored().values():
+        assert own.keys() == SUITES.keys()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("suite", sorted(SUITES))
+@pytest.mark.parametrize("method", [name for name, own in METHODS.items() if not own.needs])
+def test_what_is_stored_of_a_method_comes_again(method: str, suite: str) -> None:
+    comes_again(method, suite)
+
+
+@pytest.mark.tools
+@pytest.mark.parametrize("suite", sorted(SUITES))
+@pytest.mark.parametrize("method", [name for name, own in METHODS.items() if own.needs])
+def test_what_is_stored_of_a_method_with_a_library_comes_again(
+    method: str, suite: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (site,) = Path(tools.interpreter_with("baselines")).parents[1].glob("lib/python*/site-packages")
+    monkeypatch.setattr(sys, "path", [*sys.path, str(site)])
+    comes_again(method, suite)
+
+
+@pytest.mark.long
+def test_ppo_that_has_learned_under_the_shield_makes_at_least_half_of_the_rounds_of_rules() -> None:
+    """On trials of `junction` that it has not learned from: the median of three seeds, 6,000,000 steps each."""
+    found = {
+        who: sum(
+            own.score.counted_rounds or 0 for own in run_batch("junction", who, trials=20, seed=1000).outcomes
+        )
+        for who in ("rules", METHODS["ppo-shielded"].controller + SHIELD)
+    }
+    rules, learned = found.values()
+    assert learned >= 0.5 * rules > 0
+    known = json.loads(SEEDS.read_text(encoding="utf-8"))
+    assert rules == round(20 * known["rules"]["counted_rounds"])
+    assert len(known["shielded"]) == 3
+
+
+def comes_again(method: str, suite: str) -> None:
+    """Run a twentieth of the trials again, alone and under the shield by turns."""
+    instances, number = len(instances_of(suite)), list(METHODS).index(method)
+    for k, way in enumerate(("alone", "shield")):
+        some = list(range((number + k) % (2 * SHARE), instances, 2 * SHARE))
+        if not some:
+            continue
+        kept = stored()[method][suite][way]["columns"]
+        found, _ = run(method, suite, shield=way == "shield", some=some)
+        if method in EXACT:
+            assert found == {name: [values[k] for k in some] for name, values in kept.items()}
+        for name in ("rounds_before_breach", "counted_rounds"):
+            apart = sum(value or 0 for value in found[name]) - sum(kept[name][k] or 0 for k in some)
+            assert abs(apart) <= len(some) + 1
