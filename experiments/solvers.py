@@ -3,13 +3,14 @@
     python -m experiments solvers
 
 TuLiP, omega with dd, and Spot, each in an environment of its own (`make tools`), get the game as a specification and
-say whether the ego wins; Spot makes a strategy as well. Each has `PATIENCE` seconds a game. Ours solves the whole game,
-from all positions; its seconds are those of building and solving it.
+say whether the ego wins; Spot makes a strategy as well. Each has `PATIENCE` seconds and `MEMORY` a game. Ours solves
+the whole game, from all positions; its seconds are those of building and solving it.
 """
 
 from __future__ import annotations
 
 import json
+import resource
 import subprocess
 import sys
 import tempfile
@@ -35,6 +36,8 @@ ROOT: Final = Path(__file__).resolve().parents[1]
 TOOLS: Final = ROOT / "build" / "crosscheck"
 GAMES: Final = 12
 PATIENCE: Final = 60.0
+MEMORY: Final = 6 << 30
+"""Bytes that a tool may take."""
 TULIP: Final = """
 import runpy, sys
 from tulip.interfaces import omega
@@ -75,12 +78,20 @@ def told(command: list[str], wins: Callable[[str], bool], given: str | None = No
     began = perf_counter()
     try:
         done = subprocess.run(
-            command, input=given, capture_output=True, text=True, timeout=PATIENCE, check=False
-        )
+            command, input=given, capture_output=True, text=True, timeout=PATIENCE, check=False,
+            preexec_fn=_limit,
+        )  # fmt: skip
     except subprocess.TimeoutExpired:
         return Told(None, PATIENCE, f"not in {PATIENCE:g} s")
+    if done.returncode and ("emory" in done.stderr or "bad_alloc" in done.stderr):
+        return Told(None, perf_counter() - began, f"not in {MEMORY >> 30} GiB")
     said = done.stdout.strip().splitlines()[-1:] or done.stderr.strip().splitlines()[-1:] or [""]
     return Told(wins(said[0]), perf_counter() - began, said[0])
+
+
+def _limit() -> None:
+    """Let this process have so much memory and no more."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
 
 
 def asked(board: Board, cells: list[int]) -> dict[str, Told]:

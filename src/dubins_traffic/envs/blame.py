@@ -102,12 +102,14 @@ def blame_tables(problems: Sequence[Problem], cars: int, excuses: bool | str | f
     trial["window"] = _seconds_excused(excuses) * rate
     trial["exception_ticks"] = within = ticks(rules.exception_time, rate)
     part: Ints = np.full((len(RULES), 2), -1)
+    excepted: Ints = np.zeros(len(RULES), dtype=np.int64)
     for k, rule in enumerate(RULES):
         if assumption_of(rule) in made:
             part[k, 0] = PARTS.index(assumption_of(rule))
         if rule in EGO_RULES:
             part[k, 1] = PARTS.index(rule)
-    excepted = np.array([0 if rule.startswith("E") else int(rule[0]) for rule in RULES])
+        if not rule.startswith("E"):
+            excepted[k] = int(rule[0])
     most = min(rules.exceptions, 3 * within)  # more breaches than that do not fit into the window
     recent: Ints = np.full((len(problems), cars, most + 1), -1)
     return BlameTables(trial, part, excepted, recent, np.zeros_like(recent))
