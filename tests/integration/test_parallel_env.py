@@ -157,6 +157,22 @@ def test_a_shield_on_one_side_leaves_the_other_alone() -> None:
     assert steps[-1][4]["car_1"]["broke_first"] == "ego_0"
 
 
+def test_a_shield_that_comes_later_holds_from_the_next_episode_on() -> None:
+    """Also where next trials have been drawn ahead already; these stay the same trials."""
+    env, plain = parallel_env(config(seconds=2.0)), parallel_env(config(seconds=2.0))
+    for own in (env, plain):
+        own.reset(seed=3)
+        own.reset()
+        own.step({})
+    env.shield(env.possible_agents)
+    for own in (env, plain):
+        own.reset()
+    assert env.trial == plain.trial
+    assert "interventions" in env.step({})[4]["car_1"]
+    told = [env.step(dict.fromkeys(env.agents, np.array([1.0, 1.0])))[4] for _ in range(40)]
+    assert sum(info["interventions"] for infos in told for info in infos.values()) > 0
+
+
 def test_e_agents_are_charged_until_the_ego_has_broken_its_part_and_the_ego_is_excused_after_them() -> None:
     env = parallel_env(config(cars=5, seconds=30.0), reward={"ego": {"debt": 0.0}})
     seen: set[tuple[str, bool]] = set()

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Final, get_args
 
 import numpy as np
 import numpy.typing as npt
+from gymnasium import spaces
 
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
@@ -27,10 +28,11 @@ from dubins_traffic.learning.outlook import SIZE, new_outlook
 from dubins_traffic.observations.viewpoints import Viewpoints, ViewTables
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import KEEP_RULES, REMOTE
+from dubins_traffic.protocols import End
 from dubins_traffic.rules.breach_log import RULES
 from dubins_traffic.rules.referee import order
 from dubins_traffic.shield.car_shields import CarShields
-from dubins_traffic.shield.tables import Overtakes
+from dubins_traffic.shield.tables import Overtakes, check_overtakes
 
 if TYPE_CHECKING:
     from dubins_traffic.envs.settings import Settings
@@ -238,7 +240,7 @@ class CrewFleet(Fleet):
     envs : int
         How many there are, E.
     roles : Roles
-        Who drives the cars. Shields that are added to it hold from the next trials that are drawn on.
+        Who drives the cars.
     pay : Pay
         What they are paid for.
 
@@ -246,6 +248,10 @@ class CrewFleet(Fleet):
     ----------
     learned : list of int
         The cars that learners drive, A of N.
+    agents : list of str
+        The names of their drivers, A.
+    observation_space : gymnasium.spaces.Box
+        What one of them observes: `learning.flat`, then `envs.about_ego.NAMES`.
     commands : (E, A, 2)
         What they are to do, speed in m/s and yaw rate in rad/s.
     given : dict
@@ -261,6 +267,8 @@ class CrewFleet(Fleet):
         self.roles, self._names = roles, settings.sample.names
         self._cars = len(self._names)
         self.learned = list(roles.learned)
+        self.agents = [agent_name(car) for car in self.learned]
+        self.observation_space = spaces.Box(-1.0, 1.0, (settings.layout.size + len(NAMES),), np.float32)
         self.board = Board(envs, settings, self._cars, len(PAID))
         self.told = np.zeros((envs * self._cars, len(NAMES)), dtype=np.float32)
         self.first: Ints = np.full(envs, -1, dtype=np.int64)
@@ -272,6 +280,24 @@ class CrewFleet(Fleet):
         }  # fmt: skip
         if roles.ego is not None and (settings.disturbed or not Egos(roles.ego).is_compiled):
             self.draws_ahead = False  # whoever asks egos in a bank asks those of all its trials
+
+    def shield(self, agent: str, overtakes: str, field: str) -> None:
+        """Keep an agent within the rules from the next trials on; it may cross the centre line when `overtakes` says.
+
+        Raises
+        ------
+        InputError
+            If there is no such agent, which stands in `field`, or no such way to overtake.
+        """
+        if agent not in self.agents:
+            raise no_agent(field, agent, self.agents)
+        self.roles.shields[self.learned[self.agents.index(agent)]] = check_overtakes(overtakes)
+        self.draw_anew()
+
+    def is_terminal(self, env: int) -> bool:
+        """Tell whether an environment's trial has ended before its time, whatever the reason."""
+        ending = self.ending(env)
+        return ending is not None and ending.end is not End.DURATION
 
     def _put(self, actions: Any) -> None:
         """Write the commands of the actions of all learners, (E, A, ...), onto the board."""

@@ -296,6 +296,14 @@ class Fleet:
         if self._lacking and self.draws_ahead:
             self._prepare()
 
+    def draw_anew(self) -> None:
+        """Forget trials that have been drawn ahead, so that the next ones are drawn as things stand then."""
+        drawn = [env for env, _ in self._drawn]
+        for env, ready in enumerate(self._ready):
+            self._next[env] -= len(ready) + drawn.count(env)
+            ready.clear()
+        self._drawn.clear()
+
     def expect(self, envs: Sequence[int]) -> None:
         """Draw the next trials of environments in this order, in which their episodes are going to end."""
         self._lacking = deque(envs)

@@ -12,7 +12,6 @@ from gymnasium import spaces
 from gymnasium.utils import seeding
 from pettingzoo import ParallelEnv  # pyright: ignore[reportMissingTypeStubs]
 
-from dubins_traffic.envs.about_ego import NAMES
 from dubins_traffic.envs.crew import OF_A_CAR, CrewFleet, Roles, agent_name, no_agent
 from dubins_traffic.envs.pictures import SIDE, Renderer
 from dubins_traffic.envs.settings import Settings
@@ -20,8 +19,7 @@ from dubins_traffic.envs.terms import Pay
 from dubins_traffic.errors import DubinsTrafficError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.learning.flat import SHOWN
-from dubins_traffic.protocols import End
-from dubins_traffic.shield.tables import Overtakes, check_overtakes
+from dubins_traffic.shield.tables import Overtakes
 
 if TYPE_CHECKING:
     import os
@@ -104,13 +102,11 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
         self._cars = self.settings.sample.names
         self._ids = [agent_name(car) for car in range(len(self._cars))]
         self.names = dict(zip(self._ids, self._cars, strict=True))
-        self.possible_agents = [self._ids[car] for car in self.fleet.learned]
+        self.possible_agents = self.fleet.agents
         self.agents: list[str] = []
-        size = self.settings.layout.size + len(NAMES)
-        self.observation_spaces = {
-            name: spaces.Box(-1.0, 1.0, (size,), np.float32) for name in self.possible_agents
-        }
-        actions = self.settings.actions.space  # of which each agent has its own, seeded by itself
+        # Each agent has spaces of its own, seeded by themselves.
+        seen, actions = self.fleet.observation_space, self.settings.actions.space
+        self.observation_spaces = {name: deepcopy(seen) for name in self.possible_agents}
         self.action_spaces = {name: deepcopy(actions) for name in self.possible_agents}
         self.state_space = spaces.Box(-np.inf, np.inf, (OF_A_CAR * len(self._cars),), np.float32)
         self._seeded = self._begun = False
@@ -139,9 +135,7 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
             If there is no such agent.
         """
         for agent in agents:
-            if agent not in self.possible_agents:
-                raise no_agent("shield", agent, self.possible_agents)
-            self.fleet.roles.shields[self._ids.index(agent)] = check_overtakes(overtakes)
+            self.fleet.shield(agent, overtakes, "shield")
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -174,21 +168,14 @@ class TrafficParallelEnv(ParallelEnv[str, Any, Any]):
             given = [k for k, name in enumerate(self.agents) if name in actions]
             commands[given] = self.settings.actions.commands([actions[self.agents[k]] for k in given])
         self.fleet.command(commands)
-        ending = self.fleet.ending(0)
-        ended, terminated = ending is not None, ending is not None and ending.end is not End.DURATION
+        ended, terminated = bool(self.fleet.ended[0]), self.fleet.is_terminal(0)
         observations, rewards = self._observed(), self.fleet.of_learners("reward")[0].tolist()
         infos = {name: self._info(name, ended=ended) for name in self.agents}
-        flags = dict.fromkeys(self.agents, False)
-        given = dict(zip(self.agents, rewards, strict=True))
+        paid = dict(zip(self.agents, rewards, strict=True))
         if ended:
             self.agents = []
-        return (
-            observations,
-            given,
-            dict.fromkeys(flags, terminated),
-            dict.fromkeys(flags, ended and not terminated),
-            infos,
-        )
+        cut = ended and not terminated
+        return observations, paid, dict.fromkeys(paid, terminated), dict.fromkeys(paid, cut), infos
 
     def state(self) -> npt.NDArray[np.float32]:
         """Return the state of all cars, for critics that see more than one car does (`envs.crew.CrewFleet.state`)."""

@@ -7,19 +7,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-from gymnasium import spaces
 from gymnasium.utils import seeding
 
-from dubins_traffic.envs.about_ego import NAMES
-from dubins_traffic.envs.crew import OF_A_CAR, CrewFleet, Roles, agent_name, no_agent
+from dubins_traffic.envs.crew import OF_A_CAR, CrewFleet, Roles, agent_name
 from dubins_traffic.envs.episodes import seeds_of
 from dubins_traffic.envs.settings import Settings
 from dubins_traffic.envs.terms import PAID, Pay, costs_of
 from dubins_traffic.errors import DubinsTrafficError, InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.learning.flat import SHOWN
-from dubins_traffic.protocols import End
-from dubins_traffic.shield.tables import check_overtakes
 
 if TYPE_CHECKING:
     import os
@@ -85,14 +81,10 @@ class TrafficParallelVectorEnv:
         self.fleet = CrewFleet(
             self.settings, num_envs, Roles.of(self.settings, learned, ego, excuses), Pay(roles, reward)
         )
-        self.agents = [agent_name(car) for car in self.fleet.learned]
+        self.agents = self.fleet.agents
         for name, overtakes in (shields or {}).items():
-            if name not in self.agents:
-                raise no_agent("shields", name, self.agents)
-            car = self.fleet.learned[self.agents.index(name)]
-            self.fleet.roles.shields[car] = check_overtakes(overtakes)
-        size = self.settings.layout.size + len(NAMES)
-        self.single_observation_space = spaces.Box(-1.0, 1.0, (size,), np.float32)
+            self.fleet.shield(name, overtakes, "shields")
+        self.single_observation_space = self.fleet.observation_space
         self.single_action_space = self.settings.actions.space
         self.state_size = OF_A_CAR * len(self.settings.sample.names)
         self._seeded = False
@@ -151,8 +143,7 @@ class TrafficParallelVectorEnv:
         terminated, over = np.zeros(self.num_envs, dtype=np.bool_), fleet.ended.copy()
         if fleet.waiting:
             ended: list[int] = np.flatnonzero(over).tolist()
-            endings = [fleet.ending(env) for env in ended]
-            terminated[ended] = [own is not None and own.end is not End.DURATION for own in endings]
+            terminated[ended] = [fleet.is_terminal(env) for env in ended]
             outcomes: Any = np.empty(len(ended), dtype=object)
             outcomes[:] = fleet.outcomes(ended)
             info |= {
