@@ -15,20 +15,18 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Callable
-from itertools import permutations
 from pathlib import Path
-from random import Random
 from time import perf_counter
 from typing import Final, NamedTuple
 
 from benchmarks.table import Row, show
+from tests.games import positions
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.suites.running import board_of
 from dubins_traffic.suites.suite import load_suite
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.queues import WHO, Scene
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.specification import specification_text
 
@@ -38,11 +36,6 @@ GAMES: Final = 12
 PATIENCE: Final = 60.0
 MEMORY: Final = 6 << 30
 """Bytes that a tool may take."""
-TULIP: Final = """
-import runpy, sys
-from tulip.interfaces import omega
-print(omega.is_realizable(runpy.run_path(sys.argv[1])["specification"]))
-"""
 
 
 class Told(NamedTuple):
@@ -51,26 +44,6 @@ class Told(NamedTuple):
     wins: bool | None
     seconds: float
     words: str
-
-
-def start_of(board: Board) -> tuple[list[int], int]:
-    """Return cells of the cars, no two before one crossing, and the position that they make."""
-    cells, nodes = board.road_cells, len(board.road_cells.nodes)
-    every = list(permutations(range(cells.cells), board.others + 1))
-    Random(2016).shuffle(every)
-    for own in every:
-        ends = [cells.lane_end[cell - nodes][0] for cell in own if cell >= nodes]
-        if len(set(ends)) == len(ends):
-            return list(own), board.number([_scene(board, node, own) for node in range(nodes)])
-    raise ValueError("there is no such start")
-
-
-def _scene(board: Board, node: int, cells: tuple[int, ...]) -> Scene:
-    nodes = len(board.road_cells.nodes)
-    who = [WHO.EGO if car == 0 else WHO.OTHER for car in range(len(cells))]
-    inside = who[cells.index(node)] if node in cells else None
-    lanes = [nodes + lane for lane in board.road_cells.nodes[node].inbound]
-    return Scene(inside, tuple((lanes.index(cell), who[k]) for k, cell in enumerate(cells) if cell in lanes))
 
 
 def told(command: list[str], wins: Callable[[str], bool], given: str | None = None) -> Told:
@@ -102,17 +75,19 @@ def asked(board: Board, cells: list[int]) -> dict[str, Told]:
         for ending, file in files.items():
             file.write_text(specification_text(board, cells, ending), encoding="utf-8")
         tulip, omega, spot = (str(TOOLS / tool / "bin" / "python") for tool in ("tulip", "omega", "spot"))
-        found["TuLiP"] = told([tulip, "-c", TULIP, str(files[".py"])], lambda said: said == "True")
-        written = str(ROOT / "tests" / "crosscheck" / "written_game.py")
-        texts = json.dumps([files[".tlsf"].read_text(encoding="utf-8")]) + "\n"
-        found["omega"] = told([omega, written], lambda said: said == "[true]", texts)
-        script = [
+        for tool, python, script, ending in (
+            ("TuLiP", tulip, "tulip_realizable.py", ".py"), ("omega", omega, "written_game.py", ".tlsf")
+        ):  # fmt: skip
+            asks = [python, str(ROOT / "tests" / "crosscheck" / script)]
+            texts = json.dumps([files[ending].read_text(encoding="utf-8")]) + "\n"
+            found[tool] = told(asks, lambda said: said == "[true]", texts)
+        solves = [
             spot,
             str(ROOT / "examples" / "spot_solve.py"),
             str(files[".tlsf"]),
             str(Path(name) / "found.hoa"),
         ]
-        found["Spot"] = told(script, lambda said: said.endswith("states"))
+        found["Spot"] = told(solves, lambda said: said.endswith("states"))
     return found
 
 
@@ -126,7 +101,7 @@ def measure(games: int = GAMES) -> list[Row]:
         began = perf_counter()
         winning = solve(build(board)).winning
         ours = perf_counter() - began
-        cells, position = start_of(board)
+        cells, position = next(positions(board, 1))
         wins = bool(winning[position])
         try:
             others = asked(board, cells)

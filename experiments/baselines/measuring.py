@@ -11,6 +11,7 @@ from typing import Any, Final
 
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.engine.group import Outcome
+from dubins_traffic.files import write_text
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES
@@ -87,4 +88,4 @@ def measure(method: str, suites: Sequence[str]) -> None:
                   f"counted rounds in {len(found['end'])} trials", flush=True)  # fmt: skip
         kept["suites"][suite] = entry
         file.parent.mkdir(exist_ok=True)
-        file.write_text(json.dumps(kept) + "\n", encoding="utf-8")
+        write_text(file, json.dumps(kept) + "\n")

@@ -8,42 +8,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from itertools import permutations
 from pathlib import Path
-from random import Random
 
 import pytest
 
 from dubins_traffic.synthesis.board import Board
 from dubins_traffic.synthesis.game import build
-from dubins_traffic.synthesis.queues import WHO, Scene
 from dubins_traffic.synthesis.solver import solve
 from dubins_traffic.synthesis.specification import specification_text
-from tests.games import ALL, board, pan
+from tests.games import ALL, board, pan, positions
 from tests.tools import Solvers, solvers
 
 pytestmark = pytest.mark.tools
-
-
-def positions(some: Board, count: int) -> Iterator[tuple[list[int], int]]:
-    """Yield cells of the cars and the position that they make, no two cars before one crossing."""
-    road_cells = some.road_cells
-    cells = list(permutations(range(road_cells.cells), some.others + 1))
-    Random(2016).shuffle(cells)
-    nodes = len(road_cells.nodes)
-    for own in cells:
-        ends = [road_cells.lane_end[cell - nodes][0] for cell in own if cell >= nodes]
-        if len(set(ends)) == len(ends) and count:
-            count -= 1
-            yield list(own), some.number([_scene(some, node, own) for node in range(nodes)])
-
-
-def _scene(some: Board, node: int, cells: tuple[int, ...]) -> Scene:
-    nodes = len(some.road_cells.nodes)
-    who = [WHO.EGO if car == 0 else WHO.OTHER for car in range(len(cells))]
-    inside = who[cells.index(node)] if node in cells else None
-    lanes = [nodes + lane for lane in some.road_cells.nodes[node].inbound]
-    return Scene(inside, tuple((lanes.index(cell), who[k]) for k, cell in enumerate(cells) if cell in lanes))
 
 
 GAMES = [

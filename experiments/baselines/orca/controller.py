@@ -5,17 +5,13 @@ van den Berg, Guy, Lin, Manocha, Reciprocal n-body collision avoidance, ISRR 200
 
 from __future__ import annotations
 
-from math import hypot
-
 import pyrvo
 
 import dubins_traffic as dt
 from dubins_traffic.cars.state import Observation, Pose, Twist
 from dubins_traffic.problem.instance import Problem
-from experiments.baselines.following import toward
+from experiments.baselines.following import along_lane, toward
 
-LOOK = 0.4
-"""How far ahead on its line the velocity that the car prefers points, metres."""
 MARGIN = 0.08
 """Added to the radius of each car, since cars turn before they can go where ORCA sends them, metres."""
 HORIZON = 2.0
@@ -38,9 +34,6 @@ class Orca:
     def act(self, observation: Observation) -> tuple[float, float]:
         """Set up all that is seen anew, and take the velocity of the ego after one step."""
         pose = observation.pose
-        aim = self._navigator.look(observation).line(LOOK)
-        dx, dy = aim.x - pose.x, aim.y - pose.y
-        share = self._bounds.speed / max(hypot(dx, dy), 1e-9)
         simulator: pyrvo.RVOSimulator = pyrvo.RVOSimulator(
             self._period, self._sight, MOST, HORIZON, HORIZON, self._radius, self._bounds.speed
         )
@@ -52,7 +45,7 @@ class Orca:
             velocity = _velocity(which, twist)
             simulator.set_agent_velocity(number, velocity)
             simulator.set_agent_pref_velocity(number, velocity)
-        simulator.set_agent_pref_velocity(0, (share * dx, share * dy))
+        simulator.set_agent_pref_velocity(0, along_lane(self._navigator, observation, self._bounds))
         simulator.do_step()
         found = simulator.get_agent_velocity(0)
         return toward(pose, self._bounds, found.x, found.y)

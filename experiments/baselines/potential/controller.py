@@ -10,10 +10,8 @@ from math import hypot
 import dubins_traffic as dt
 from dubins_traffic.cars.state import Observation
 from dubins_traffic.problem.instance import Problem
-from experiments.baselines.following import toward
+from experiments.baselines.following import along_lane, toward
 
-LOOK = 0.4
-"""How far ahead on its line lies the point that draws the car, metres."""
 REACH = 1.2
 """Distance of centres from which on another car pushes, metres."""
 PUSH = 0.05
@@ -31,10 +29,7 @@ class Potential:
     def act(self, observation: Observation) -> tuple[float, float]:
         """Go where the sum of the forces points, as fast as it is large."""
         x, y = observation.pose.x, observation.pose.y
-        aim = self._navigator.look(observation).line(LOOK)
-        dx, dy = aim.x - x, aim.y - y
-        pull = self._bounds.speed / max(hypot(dx, dy), 1e-9)
-        fx, fy = pull * dx, pull * dy
+        fx, fy = along_lane(self._navigator, observation, self._bounds)
         for car in observation.others:
             ax, ay = x - car.pose.x, y - car.pose.y
             away = hypot(ax, ay)
