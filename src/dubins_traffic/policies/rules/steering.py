@@ -81,7 +81,8 @@ def move(
     if passes or vehicle.tightest > 0.0:
         speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
     safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
-    if safe and speed == 0.0 and vehicle.tightest == 0.0 and (passes or steep == ABRUPT):
+    # A car that turns in place to where it may not drive would turn back in the next tick, and so on for ever.
+    if safe and speed == 0.0 and vehicle.tightest == 0.0 and (passes or steep == ABRUPT or offset < 0.0):
         pose = Pose(state.x[b, n], state.y[b, n], *heading(Line(left - offset, px, py, allowed), steep))
         safe = is_safe_from(pose, b, Command(allowed, 0.0), near, trusted, traffic, vehicle)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
