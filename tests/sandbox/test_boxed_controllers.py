@@ -12,15 +12,19 @@ from pathlib import Path
 import pytest
 
 import dubins_traffic as dt
+from dubins_traffic.controllers import registry
 from dubins_traffic.errors import InputError
+from dubins_traffic.learning.policy import load
 from dubins_traffic.protocols import End
 from dubins_traffic.sandbox import Limits, boxed_controller
 from tests.boxes import driven, needs_boxes, written
 from tests.conformance.transport import frames
+from tests.onnx_models import exported, product
 from tests.recordings import make_instance
 from tests.tools import need_programs
 
 pytestmark = needs_boxes
+LEARNED = Path(__file__).parents[2] / "examples" / "learning"
 HOMING = f"{Path(__file__).parents[2] / 'examples' / 'controller.py'}:Homing"
 
 
@@ -263,3 +267,22 @@ def test_what_a_controller_makes_that_answers_at_once_is_looked_at_too(tmp_path:
     assert result.ending.end is End.OUT_OF_MEMORY
     assert "more than 1024 files" in result.ending.detail
     assert controller.end is not None
+
+
+def test_a_policy_in_onnx_drives_in_a_box_whether_or_not_one_is_asked_for(tmp_path: Path) -> None:
+    policy = load(LEARNED / "junction.npz")
+    model = exported(policy, tmp_path / "policy.onnx")
+    instance = replace(dt.draw(dt.load_config("junction"), seed=1000), duration=20.0)
+    in_process = dt.run_trial(instance, f"{LEARNED / 'junction.npz'}")
+    for name in (f"{model}", f"{model}+sandbox"):
+        found = dt.run_trial(instance, name)
+        assert found.ending.end == End.DURATION
+        assert registry.ran(name) == registry.BOXED
+        assert found.score.goals_visited == in_process.score.goals_visited
+    product(model, 7, 2)
+    ended = dt.run_trial(instance, f"{model}+shield").ending
+    assert ended.end == End.CONTROLLER_FAULT
+    assert "input: does not fit: got 7; expected" in ended.detail
+    model.unlink()
+    with pytest.raises(InputError, match="no such file"):
+        dt.run_trial(instance, f"{model}")

@@ -26,8 +26,8 @@ from stable_baselines3.common.vec_env import VecEnv
 
 from dubins_traffic.envs.episodes import Levels
 from dubins_traffic.envs.parallel_vector import TrafficParallelVectorEnv
-from dubins_traffic.envs.settings import SPEEDS, TURNS
 from dubins_traffic.envs.vector import TrafficVectorEnv
+from dubins_traffic.learning.actions import CHOICES
 from dubins_traffic.learning.policy import Policy
 
 CONFIG, CARS, SKIP, ENVS, LEVELS = "junction", 3, 6, 64, 200
@@ -171,12 +171,11 @@ def train(seed: int, steps: int, *, lagrangian: bool, shielded: bool) -> Policy:
     model.learn(steps, callback=Follows(lagrangian=lagrangian))
     parts = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
     layers = [part for part in parts if isinstance(part, torch.nn.Linear)]
-    choices = np.array([(speed, turn) for speed in SPEEDS for turn in TURNS])
     kept = tuple(
         (own.weight.detach().numpy().astype(np.float64), own.bias.detach().numpy().astype(np.float64))
         for own in layers
     )
-    return Policy(tuple(env.settings.layout.names), CARS, SKIP, kept, choices)
+    return Policy(tuple(env.settings.layout.names), CARS, SKIP, kept, CHOICES)
 
 
 def main() -> None:

@@ -63,6 +63,8 @@ def load(spec: str) -> Controller:
     if spec.endswith(".npz"):
         learned = _module("learned")
         return cast(Controller, (learned if learned.is_policy(spec) else _module("synthesized")).player(spec))
+    if spec.endswith(".onnx"):
+        return cast(Controller, ABOVE.boxed(spec, ""))
     if (file := foreign(spec)) is not None:
         return cast(Controller, _module("synthesized").foreign_player(file, fallback=file != spec))
     if not outside.is_place(spec):
@@ -72,7 +74,7 @@ def load(spec: str) -> Controller:
 
 def foreign(spec: str) -> str | None:
     """Return the file of the strategy of another tool that a name stands for, None for any other controller."""
-    if spec.endswith((".mcap", ".npz")):
+    if spec.endswith((".mcap", ".npz", ".onnx")):
         return None
     file = spec if is_file(spec) else spec.removesuffix(FALLBACK)
     plays = is_file(file) and (not file.endswith(".py") or begins_with(file, CLASS_FIRST))

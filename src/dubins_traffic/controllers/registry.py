@@ -80,10 +80,10 @@ def load(spec: str) -> Controller:
         directory; a file may import its neighbours. A record, ``NAME.mcap``, replays the ego's commands. A strategy
         that `dubins-traffic synth` has saved, ``NAME.npz``, or one of another tool (`synthesis.foreign`), told by the
         content of its file, is played by `synthesized`; with the suffix ``+fallback`` the ego goes on by the rules
-        where that strategy makes no move of the game. A policy of `learning.policy`, ``NAME.npz``, drives. With
-        the suffix ``+shield`` it drives under the shield, with ``+shield:law`` or ``+shield:never`` under one with
-        another rule for overtaking (`controllers.shield.Shield`); with ``+sandbox`` it drives in a box
-        (`dubins_traffic.sandbox`).
+        where that strategy makes no move of the game. A policy of `learning.policy`, ``NAME.npz``, drives, and one
+        in ONNX, ``NAME.onnx``, in a box. With the suffix ``+shield`` it drives under the shield, with ``+shield:law``
+        or ``+shield:never`` under one with another rule for overtaking (`controllers.shield.Shield`); with
+        ``+sandbox`` it drives in a box (`dubins_traffic.sandbox`).
 
     Raises
     ------
@@ -144,6 +144,8 @@ def ran(name: str | None) -> str | None:
         return TRUSTED if "trust" in box["limits"].split(",") else BOXED
     if bare in TRANSPORTS:
         return ELSEWHERE
+    if bare.endswith(".onnx"):
+        return BOXED
     return IN_PROCESS if bare else None
 
 

@@ -16,6 +16,7 @@ from dubins_traffic.envs.episodes import Episodes, Levels
 from dubins_traffic.envs.terms import weights_of
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
+from dubins_traffic.learning.actions import CHOICES
 from dubins_traffic.learning.flat import SHOWN, Layout
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.instance import Instance
@@ -25,12 +26,6 @@ if TYPE_CHECKING:
     from dubins_traffic.cars.body import Bounds
 
 
-SPEEDS: Final = (0.0, 0.5, 1.0)
-"""Speeds of discrete actions: from the middle of the car's range (0 where it may reverse) to its top speed."""
-TURNS: Final = (-1.0, -0.25, 0.0, 0.25, 1.0)
-"""Yaw rates of discrete actions, as shares of the top yaw rate; action ``5 j + k`` is speed j and turn k."""
-
-
 class ActionMap:
     """The table of the commands that actions stand for.
 
@@ -38,7 +33,7 @@ class ActionMap:
     ----------
     kind : str
         ``continuous``: two numbers from -1 to 1, speed and yaw rate, scaled to the car's bounds. ``discrete``: one of
-        the pairs of `SPEEDS` and `TURNS`.
+        `learning.actions.CHOICES`.
 
     Attributes
     ----------
@@ -58,9 +53,8 @@ class ActionMap:
         if kind == "continuous":
             self.space = spaces.Box(-1.0, 1.0, (2,), np.float32)
         elif kind == "discrete":
-            pairs = [(speed, turn) for speed in SPEEDS for turn in TURNS]
-            self._table = np.array(pairs)
-            self.space = spaces.Discrete(len(pairs))
+            self._table = CHOICES
+            self.space = spaces.Discrete(len(CHOICES))
         else:
             raise InputError("no such actions", field="action", value=kind, expected="continuous or discrete")
 
@@ -92,8 +86,8 @@ class ActionMap:
         chosen = np.asarray(actions)
         if not np.issubdtype(chosen.dtype, np.integer):
             raise _no_action(actions, "an integer each")
-        if len(chosen) and not (chosen.min() >= 0 and chosen.max() < len(SPEEDS) * len(TURNS)):
-            raise _no_action(actions, f"from 0 to {len(SPEEDS) * len(TURNS) - 1}")
+        if len(chosen) and not (chosen.min() >= 0 and chosen.max() < len(CHOICES)):
+            raise _no_action(actions, f"from 0 to {len(CHOICES) - 1}")
         return chosen
 
 

@@ -1,4 +1,4 @@
-"""The controller of a learned policy: a network on the flat observation, read from a file."""
+"""The controller of a learned policy: a network on the flat observation, read from a file of ours."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, cast
+from typing import TYPE_CHECKING, Any, Final, Protocol, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -30,6 +30,34 @@ _DAMAGED: Final = (OSError, ValueError, EOFError, KeyError, TypeError, zipfile.B
 _HEAD: Final = ("names", "cars", "frame_skip", "choices")
 """Arrays of a policy's file beside its layers, `weights0`, `bias0`, `weights1`, ..."""
 Layer = tuple[Floats, Floats]
+
+
+class Acts(Protocol):
+    """A policy that drives, as `Policy` does; with no `names` it is shown the whole flat observation."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """As of `Policy`."""
+        ...
+
+    @property
+    def inputs(self) -> int:
+        """How many numbers it is shown, V."""
+        ...
+
+    @property
+    def cars(self) -> int:
+        """As of `Policy`."""
+        ...
+
+    @property
+    def frame_skip(self) -> int:
+        """As of `Policy`."""
+        ...
+
+    def act(self, seen: npt.NDArray[Any]) -> Floats:
+        """As of `Policy`."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -71,6 +99,11 @@ class Policy:
             raise InputError("not a policy", field=which, expected=expected)
         if self.frame_skip < 1 or self.cars < 0:
             raise InputError("not a policy", field="frame_skip", value=self.frame_skip, expected=">= 1")
+
+    @property
+    def inputs(self) -> int:
+        """How many numbers it is shown, V."""
+        return len(self.names)
 
     def act(self, seen: npt.NDArray[Any]) -> Floats:
         """Return the action, shares (-1 to 1) of the largest speed and yaw rate, (2,), for the input `seen`, (V,)."""
@@ -151,11 +184,11 @@ class Learned:
 
     Parameters
     ----------
-    policy : Policy
-        The policy.
+    policy : Acts
+        The policy, `Policy` or another.
     """
 
-    def __init__(self, policy: Policy) -> None:
+    def __init__(self, policy: Acts) -> None:
         self._policy = policy
 
     def start(self, problem: Problem) -> None:
@@ -164,16 +197,20 @@ class Learned:
         Raises
         ------
         InputError
-            If the problem's flat observation lacks one of the inputs.
+            If the problem's flat observation lacks one of the inputs, or has more or fewer numbers.
         """
         self._observe = FlatObserver(problem, self._policy.cars)
         places = {name: k for k, name in enumerate(self._observe.layout.names)}
-        missing = [name for name in self._policy.names if name not in places]
+        names = self._policy.names or tuple(places)
+        missing = [name for name in names if name not in places]
         if missing:
             raise InputError(
                 "not in the observation", field="names", value=missing[0], expected="a name of Layout"
             )
-        self._places = np.array([places[name] for name in self._policy.names], dtype=np.int64)
+        if self._policy.inputs != len(names):
+            expected = f"{len(names)} numbers, those of {len(self._policy.names) or 'all'} names of Layout"
+            raise InputError("does not fit", field="input", value=self._policy.inputs, expected=expected)
+        self._places = np.array([places[name] for name in names], dtype=np.int64)
         bounds = problem.car.bounds
         low = -bounds.speed if bounds.speed_min is None else bounds.speed_min
         self._half = 0.5 * (bounds.speed - low), bounds.yaw_rate

@@ -17,6 +17,7 @@ from dubins_traffic.controllers import registry
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import is_file
 from dubins_traffic.kernels import folders
+from dubins_traffic.learning import onnx_policy
 from dubins_traffic.sandbox import images
 from dubins_traffic.sandbox.launch import Program, Shown
 
@@ -33,6 +34,8 @@ PYTHON: Final = "/python"
 """Where a box sees an interpreter that is not the system's."""
 SHIM: Final = "sandbox/shim.py"
 EXPECTED: Final = "a controller, program:PATH, or a folder with controller.toml"
+BOXED_POLICY: Final = f"{onnx_policy.__name__}:{onnx_policy.Boxed.__name__}"
+"""Who drives there by a policy in ONNX."""
 KERNELS: Final = "/kernels"
 """Where a box sees the compiled kernels of this machine."""
 ONE_THREAD: Final = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"}
@@ -63,6 +66,10 @@ def program_of(spec: str) -> Program:
     if spec.endswith((".mcap", ".npz")):
         path = _file(spec, spec)
         return _python(f"{PLACE}/{path.name}", Shown(str(path), f"{PLACE}/{path.name}", own=True))
+    if spec.endswith(onnx_policy.SUFFIX):
+        path = _file(spec, spec)
+        onnx_policy.check_file(path)
+        return _python(BOXED_POLICY, Shown(str(path), onnx_policy.BOXED, own=True))
     if outside.is_place(spec):
         return _module(spec)
     if spec not in registry.names():
