@@ -46,8 +46,8 @@ environment rtamt rtamt 'rtamt==0.4.10' setuptools
 environment psytaliro ppft --no-deps 'psy-taliro==3.2.0' 'pybanquo==0.1.1' 'pathos==0.3.5' 'ppft==1.7.8' 'dill==0.4.1' \
   'attrs>=24.1' 'sortedcontainers~=2.4'
 # The libraries of methods of others, which run in .venv as well.
-environment baselines pyrvo --no-deps -r experiments/baselines/orca/constraints.txt \
-  -r experiments/baselines/mpc/constraints.txt
+environment baselines ompl,pyrvo --no-deps -r experiments/baselines/orca/constraints.txt \
+  -r experiments/baselines/mpc/constraints.txt -r experiments/baselines/rrt/constraints.txt
 environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
 environment omega dd.cudd,omega.games.gr1 'omega==0.4.0' 'dd==0.6.0' setuptools
 environment jazzy rclpy 'ros-rclpy~=7.1.6' 'ros-rmw-fastrtps-cpp~=8.4' 'ros-nav-msgs~=5.3'

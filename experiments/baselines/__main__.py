@@ -1,6 +1,6 @@
 """Measures methods on suites, writes the record of one trial, or writes the page.
 
-python -m experiments.baselines [METHOD...] [--suites NAME,...] [--page]
+python -m experiments.baselines [METHOD...] [--suites NAME,...] [--failures] [--page]
 python -m experiments.baselines METHOD [--shield] --record SUITE K FILE
 """
 
@@ -25,6 +25,7 @@ def main() -> int:
         "--record", nargs=3, metavar=("SUITE", "K", "FILE"), help="trial K of those that are run"
     )
     parser.add_argument("--shield", action="store_true", help="under the shield")
+    parser.add_argument("--failures", action="store_true", help="find what each fails at, and draw it")
     parser.add_argument("--page", action="store_true", help="write the page from what is stored")
     asked = parser.parse_args()
     if asked.record:
@@ -36,6 +37,10 @@ def main() -> int:
         return 0
     for method in asked.methods:
         measure(method, asked.suites.split(","))
+    if asked.failures:
+        from experiments.baselines.failures import find
+
+        find()
     if asked.page:
         from experiments.baselines.page import write_page
 

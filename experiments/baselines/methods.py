@@ -36,6 +36,9 @@ METHODS: Final[Mapping[str, Method]] = {
     "orca": Method(
         "ORCA", _of("orca", "Orca"), "the velocity nearest to the lane's that meets nobody", "pyrvo"
     ),
+    "rrt": Method(
+        "RRT*", _of("rrt", "Rrt"), "tracks the lane, and plans Dubins paths past who is in the way", "ompl"
+    ),
     "mpc": Method(
         "model predictive control", _of("mpc", "Mpc"), "tracks the lane for two seconds ahead, clear of others",
         "casadi",

@@ -8,15 +8,20 @@ from pathlib import Path
 from statistics import fmean
 from typing import Any, Final
 
+import numpy as np
+
+from dubins_traffic.campaign.report.statistics import estimate, is_decided
 from dubins_traffic.files import write_text
 from dubins_traffic.scoring.verdict import EGO_RULES
+from experiments.baselines.failures import COMMON, SUITE
+from experiments.baselines.failures import FILE as FAILURES
 from experiments.baselines.measuring import RESULTS, SUITES
 from experiments.baselines.methods import METHODS
 
 DOCS: Final = Path(__file__).resolve().parents[2] / "docs"
 PICTURE: Final = DOCS / "pictures" / "baselines.svg"
 SEEDS: Final = Path(__file__).parent / "ppo" / "seeds.json"
-WAYS: Final = {"alone": "", "shield": ", shielded"}
+WAYS: Final = {"alone": "", "shield": " + shield"}
 HEAD: Final = """\
 # Baselines
 
@@ -61,8 +66,26 @@ def page() -> str:
     ]
     for suite in SUITES:
         lines += [*_section(suite, known), ""]
-    lines += [*_seeds(), ""]
+    lines += [*_failures(), "", *_seeds(), ""]
     return "\n".join([*lines, FOOT])
+
+
+def _failures() -> Iterator[str]:
+    """Yield what each method fails at, alone."""
+    yield "## What each fails at"
+    yield ""
+    yield (
+        f"Alone, in `{SUITE}`: what it breaks most but for `{COMMON}`, which whoever knows no stop line breaks at each"
+        " of them; where it does so first; and the trial K for `--record` ([below](#again))."
+    )
+    yield ""
+    yield "![The ego (blue) of each method where it first breaks what it breaks most](pictures/baselines-failures.svg)"
+    yield ""
+    yield "| method | breaks most | K | first |"
+    yield "|---|---|--:|---|"
+    for name, own in json.loads(FAILURES.read_text(encoding="utf-8")).items():
+        cells = ("nothing", "", "") if own is None else (f"`{own['rule']}`", str(own["trial"]), own["says"])
+        yield f"| {METHODS[name].title} | {' | '.join(cells)} |"
 
 
 def _seeds() -> Iterator[str]:
@@ -121,7 +144,7 @@ def _mean(values: Sequence[float | None]) -> str:
 def _says(entries: Mapping[str, Mapping[str, Any]]) -> str:
     """Return what the numbers of a suite come to, in sentences."""
     best = _best(entries)
-    words = f"Most counted rounds: {', '.join(best[:3])}."
+    words = f"Most counted rounds: {', '.join(best[:3])}. {_ties(entries)}"
     idle = [
         METHODS[name].title
         for name, own in entries.items()
@@ -140,6 +163,26 @@ def _says(entries: Mapping[str, Mapping[str, Any]]) -> str:
         each_rule = (f"`{rule}` by {', '.join(names)}" for rule, names in most.items())
         words += f" What they break most, alone: {'; '.join(each_rule)}."
     return words
+
+
+def _ties(entries: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return a sentence on those that can't be told apart from the best: the interval of the difference holds 0."""
+    rounds = {
+        METHODS[name].title + words: np.array([one or 0.0 for one in own[way]["columns"]["counted_rounds"]])
+        for name, own in entries.items()
+        for way, words in WAYS.items()
+    }
+    able = sorted((name for name in rounds if rounds[name].any()), key=lambda own: -rounds[own].mean())
+    if not able:
+        return "All fail here: the suite tells no method from another."
+    best, *others = able
+    ends = {name: estimate(rounds[best] - rounds[name], median=False).mean_interval for name in others}
+    ties = [name for name, interval in ends.items() if interval is None or not is_decided(interval)]
+    if not ties:
+        return f"{best} is told apart from each of the others."
+    told = f"{len(others) - len(ties)} of {len(others)} others with counted rounds are told apart from {best}"
+    weak = " So it hardly tells good methods apart." if 2 * len(ties) > len(others) else ""
+    return f"{told}; {', '.join(ties)} {'are' if len(ties) > 1 else 'is'} not.{weak}"
 
 
 def _best(entries: Mapping[str, Mapping[str, Any]]) -> list[str]:
@@ -179,7 +222,7 @@ def draw() -> None:
                 )
                 for way in WAYS
             ]
-            colour = f"C{k % 10}"
+            colour = f"C{k}" if k < 10 else "black"
             field.plot(*zip(*points, strict=True), color=colour, linewidth=0.6, alpha=0.5)
             field.plot(
                 *points[0], "o", color=colour, markersize=5, label=METHODS[name].title.replace("`", "")

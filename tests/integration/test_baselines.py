@@ -7,6 +7,8 @@ import sys
 from pathlib import Path
 
 import pytest
+from experiments.baselines.failures import FILE as FAILURES
+from experiments.baselines.failures import SUITE, seen_again, typical
 from experiments.baselines.measuring import SHIELD, SUITES, instances_of, run
 from experiments.baselines.methods import METHODS
 from experiments.baselines.page import DOCS, PICTURE, SEEDS, page, stored
@@ -26,6 +28,21 @@ def test_the_page_is_made_of_what_is_stored() -> None:
     assert stored().keys() == METHODS.keys()
     for own in stored().values():
         assert own.keys() == SUITES.keys()
+
+
+def test_what_each_fails_at_is_what_it_breaks_most() -> None:
+    kept = json.loads(FAILURES.read_text(encoding="utf-8"))
+    assert kept.keys() == METHODS.keys()
+    for name, own in kept.items():
+        found = typical(stored()[name][SUITE]["alone"]["columns"])
+        assert found == (None if own is None else (own["rule"], own["trial"])), name
+
+
+@pytest.mark.parametrize("method", sorted(EXACT - {"rules"}))
+def test_the_failure_that_is_told_is_seen_again(method: str, tmp_path: Path) -> None:
+    own = json.loads(FAILURES.read_text(encoding="utf-8"))[method]
+    _, breach, sentence = seen_again(method, own["rule"], own["trial"], tmp_path / "it.mcap")
+    assert (breach.time, sentence) == (own["time"], own["says"])
 
 
 @pytest.mark.long
