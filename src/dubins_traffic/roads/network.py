@@ -407,10 +407,11 @@ class RoadNetwork(Pictured):
     @cached_property
     def ends(self) -> Ints:
         """Numbers of the intersections at both ends of each segment, (S, 2)."""
-        rows = [(self._numbers[x0, y0], self._numbers[x1, y1]) for x0, y0, x1, y1 in self.segments]
-        ends = np.array(rows, dtype=np.int64)
-        ends.flags.writeable = False
-        return ends
+        return _fixed(np.array(self._end_pairs, dtype=np.int64))
+
+    @cached_property
+    def _end_pairs(self) -> list[tuple[int, int]]:
+        return [(self._numbers[x0, y0], self._numbers[x1, y1]) for x0, y0, x1, y1 in self.segments]
 
     @cached_property
     def _steps(self) -> Floats:
@@ -471,7 +472,7 @@ class RoadNetwork(Pictured):
 
     def lane_ends(self, lane: int) -> tuple[int, int]:
         """Return the intersections in which a lane begins and ends."""
-        first, second = self.ends[lane >> 1].tolist()
+        first, second = self._end_pairs[lane >> 1]
         return (second, first) if lane & 1 else (first, second)
 
     def to_world(self, points: npt.ArrayLike) -> Floats:

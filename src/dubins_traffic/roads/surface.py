@@ -372,14 +372,9 @@ def _drawn(surface: Surface, half_width: float) -> RoadRaster:
     distance: Floats = np.sqrt(surface.distance2(x, y, item))
     reach = sqrt(0.5) * side + slack
     keep = distance <= half_width + reach
-    number, item, x, y = (cy * nx + cx)[keep], item[keep], x[keep], y[keep]
+    number, item = (cy * nx + cx)[keep], item[keep]
     paved = np.full(nx * ny, CELL.OFF, dtype=np.int64)
     paved[number] = item
     paved[np.bincount(number, minlength=nx * ny) > 1] = CELL.MIXED
-    whole = np.ones(len(number), dtype=np.bool_)
-    inner = max(0.0, half_width - slack)
-    for dx in (-0.5, 0.5):
-        for dy in (-0.5, 0.5):
-            whole &= surface.distance2(x + dx * side, y + dy * side, item) < inner * inner
-    paved[number[whole]] = CELL.ON
+    paved[number[distance[keep] <= half_width - reach]] = CELL.ON
     return RoadRaster(1.0 / side, nx, ny, paved)

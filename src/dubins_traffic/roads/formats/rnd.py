@@ -108,6 +108,8 @@ def is_integer(value: object) -> TypeGuard[int]:
     """Whether `value` is a whole number (2.0 is one, True is not)."""
     if type(value) is int:
         return True
+    if type(value) is float:
+        return value.is_integer()
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
     return isinstance(value, Integral) or (math.isfinite(value) and float(value).is_integer())
@@ -115,6 +117,8 @@ def is_integer(value: object) -> TypeGuard[int]:
 
 def is_finite(value: object) -> TypeGuard[float]:
     """Whether `value` is a number that a float64 holds and not NaN."""
+    if type(value) is float:
+        return math.isfinite(value)
     if isinstance(value, bool) or not isinstance(value, Real):
         return False
     try:
