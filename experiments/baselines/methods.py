@@ -30,10 +30,6 @@ METHODS: Final[Mapping[str, Method]] = {
     "simple": Method("`simple`", "simple", "straight across country from goal to goal, as in 2016"),
     "lanes": Method("`lanes`", "lanes", "keeps to its lane and behind others, and overtakes; stops nowhere"),
     "rules": Method("`rules`", "rules", "keeps all the rules, by construction"),
-    "synthesized": Method(
-        "`synthesized`", "synthesized",
-        "plays a strategy that wins the GR(1) game of cells, found at the start; none where the game is too large",
-    ),
     "potential": Method(
         "potential field", _of("potential", "Potential"), "pulled along the lane, pushed away by cars"
     ),
