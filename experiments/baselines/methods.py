@@ -53,7 +53,7 @@ METHODS: Final[Mapping[str, Method]] = {
         "PPO", str(HERE / "ppo" / "ppo.npz"), "on `junction`, with the default reward; the median of three seeds"
     ),
     "ppo-shielded": Method(
-        "PPO, taught under the shield", str(HERE / "ppo" / "shielded.npz"),
+        "PPO taught under the shield", str(HERE / "ppo" / "shielded.npz"),
         "the same, and the shield was there while it learned; the median of three seeds",
     ),
 }  # fmt: skip
