@@ -71,6 +71,16 @@ def test_what_is_larger_than_a_share_is_clipped(tmp_path: Path) -> None:
     assert policy.act(np.ones(1)).tolist() == [1.0, -0.5]
 
 
+def test_a_model_that_draws_random_numbers_draws_the_same_again(tmp_path: Path) -> None:
+    node = helper.make_node("RandomUniformLike", ["seen"], ["action"], high=1.0, low=-1.0)
+    path = written(tmp_path / "p.onnx", [node], {}, width=2)
+    first, again = (
+        [policy.act(np.zeros(2)).tolist() for _ in range(3)] for policy in map(OnnxPolicy, (path, path))
+    )
+    assert first == again
+    assert first[0] != first[1]
+
+
 def test_what_does_not_fit_the_observation_is_refused_at_the_start(tmp_path: Path) -> None:
     problem = draw(load_config("junction"), 1).problem
     policy = Learned(OnnxPolicy(product(tmp_path / "p.onnx", 7, 2)))
