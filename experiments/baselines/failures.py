@@ -14,7 +14,7 @@ from dubins_traffic.files import write_text
 from dubins_traffic.record.reader import Record
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.verdict import EGO_NAME, EGO_RULES
-from experiments.baselines.measuring import RESULTS, instances_of
+from experiments.baselines.measuring import RESULTS, instances_of, stored
 from experiments.baselines.methods import METHODS
 
 SUITE: Final = "rules-2026"
@@ -53,10 +53,9 @@ def find() -> None:
 
     mpl.rcParams["svg.hashsalt"] = "failures"
     mpl.rcParams["font.size"] = 7
-    kept: dict[str, Any] = {}
+    known, kept = stored(), dict[str, Any]()
     for name in METHODS:
-        stored = json.loads((RESULTS / f"{name}.json").read_text(encoding="utf-8"))
-        found = typical(stored["suites"][SUITE]["alone"]["columns"])
+        found = typical(known[name][SUITE]["alone"]["columns"])
         kept[name] = None if found is None else {"rule": found[0], "trial": found[1]}
     drawn = {name: own for name, own in kept.items() if own is not None}
     rows = -(-len(drawn) // 5)

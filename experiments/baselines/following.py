@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import atan2, cos, hypot
 
 from dubins_traffic.cars.body import Bounds
-from dubins_traffic.cars.state import Observation, Pose
-from dubins_traffic.controllers.navigator import Navigator
+from dubins_traffic.cars.state import Pose
+from dubins_traffic.controllers.navigator import Situation
 
 LOOK = 0.4
 """How far ahead on its line lies the point that a car is drawn to, metres."""
@@ -14,12 +14,17 @@ GAIN = 4.0
 """Yaw rate for an error of a radian, 1/s."""
 
 
-def along_lane(navigator: Navigator, observation: Observation, bounds: Bounds) -> tuple[float, float]:
-    """Return the velocity (x, y), m/s, at the top speed toward a point ahead on the line to follow."""
-    pose, aim = observation.pose, navigator.look(observation).line(LOOK)
-    dx, dy = aim.x - pose.x, aim.y - pose.y
+def at_top_speed(pose: Pose, bounds: Bounds, x: float, y: float) -> tuple[float, float]:
+    """Return the velocity (x, y), m/s, at the top speed from a pose toward a point, metres."""
+    dx, dy = x - pose.x, y - pose.y
     share = bounds.speed / max(hypot(dx, dy), 1e-9)
     return share * dx, share * dy
+
+
+def along_lane(here: Situation, pose: Pose, bounds: Bounds) -> tuple[float, float]:
+    """Return the velocity (x, y), m/s, at the top speed toward a point ahead on the line to follow."""
+    aim = here.line(LOOK)
+    return at_top_speed(pose, bounds, aim.x, aim.y)
 
 
 def toward(pose: Pose, bounds: Bounds, dx: float, dy: float) -> tuple[float, float]:

@@ -89,3 +89,13 @@ def measure(method: str, suites: Sequence[str]) -> None:
         kept["suites"][suite] = entry
         file.parent.mkdir(exist_ok=True)
         write_text(file, json.dumps(kept) + "\n")
+
+
+def stored() -> dict[str, dict[str, Any]]:
+    """Return what is stored of each method that has been measured, by suite."""
+    found = {name: RESULTS / f"{name}.json" for name in METHODS}
+    return {
+        name: json.loads(file.read_text(encoding="utf-8"))["suites"]
+        for name, file in found.items()
+        if file.exists()
+    }

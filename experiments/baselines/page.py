@@ -12,10 +12,11 @@ import numpy as np
 
 from dubins_traffic.campaign.report.statistics import estimate, is_decided
 from dubins_traffic.files import write_text
+from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.scoring.verdict import EGO_RULES
 from experiments.baselines.failures import COMMON, SUITE
 from experiments.baselines.failures import FILE as FAILURES
-from experiments.baselines.measuring import RESULTS, SUITES
+from experiments.baselines.measuring import SUITES, stored
 from experiments.baselines.methods import METHODS
 
 DOCS: Final = Path(__file__).resolve().parents[2] / "docs"
@@ -39,16 +40,6 @@ of a method says what it assumes and pins what it needs.
 `python -m experiments.baselines orca --record rules-2026 4 it.mcap` writes the record of trial 4, and with `--shield`
 that of the same under the shield, to be judged and [replayed](watch.md) as any other.
 """
-
-
-def stored() -> dict[str, dict[str, Any]]:
-    """Return what is stored of each method that has been measured, by suite."""
-    found = {name: RESULTS / f"{name}.json" for name in METHODS}
-    return {
-        name: json.loads(file.read_text(encoding="utf-8"))["suites"]
-        for name, file in found.items()
-        if file.exists()
-    }
 
 
 def page() -> str:
@@ -167,11 +158,7 @@ def _says(entries: Mapping[str, Mapping[str, Any]]) -> str:
 
 def _ties(entries: Mapping[str, Mapping[str, Any]]) -> str:
     """Return a sentence on those that can't be told apart from the best: the interval of the difference holds 0."""
-    rounds = {
-        METHODS[name].title + words: np.array([one or 0.0 for one in own[way]["columns"]["counted_rounds"]])
-        for name, own in entries.items()
-        for way, words in WAYS.items()
-    }
+    rounds = _rounds(entries)
     able = sorted((name for name in rounds if rounds[name].any()), key=lambda own: -rounds[own].mean())
     if not able:
         return "All fail here: the suite tells no method from another."
@@ -186,12 +173,17 @@ def _ties(entries: Mapping[str, Mapping[str, Any]]) -> str:
 
 
 def _best(entries: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    rounds = {
-        METHODS[name].title + words: fmean(one or 0.0 for one in own[way]["columns"]["counted_rounds"])
+    rounds = {name: own.mean() for name, own in _rounds(entries).items()}
+    return [f"{name} ({rounds[name]:.2f})" for name in sorted(rounds, key=lambda own: -rounds[own])]
+
+
+def _rounds(entries: Mapping[str, Mapping[str, Any]]) -> dict[str, Floats]:
+    """Return the counted rounds of each method and way, trial by trial."""
+    return {
+        METHODS[name].title + words: np.array([one or 0.0 for one in own[way]["columns"]["counted_rounds"]])
         for name, own in entries.items()
         for way, words in WAYS.items()
     }
-    return [f"{name} ({rounds[name]:.2f})" for name in sorted(rounds, key=lambda own: -rounds[own])]
 
 
 def breaches(columns: Mapping[str, Sequence[int | None]]) -> float:

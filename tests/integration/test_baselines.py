@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 from experiments.baselines.failures import FILE as FAILURES
 from experiments.baselines.failures import SUITE, seen_again, typical
-from experiments.baselines.measuring import SHIELD, SUITES, instances_of, run
+from experiments.baselines.measuring import SHIELD, SUITES, instances_of, run, stored
 from experiments.baselines.methods import METHODS
-from experiments.baselines.page import DOCS, PICTURE, SEEDS, page, stored
+from experiments.baselines.page import DOCS, PICTURE, SEEDS, page
 
 from dubins_traffic.engine.batch import run_batch
 from tests import tools

@@ -101,7 +101,6 @@ def test_what_is_no_policy_is_refused_by_name(tmp_path: Path) -> None:
     refused(path, "can't be read")
     path.write_bytes(b"")
     refused(path, "can't be run")
-    path.write_bytes(b"")
     with path.open("r+b") as stream:
         stream.truncate(MOST + 1)
     refused(path, f"too large: got {MOST + 1}")

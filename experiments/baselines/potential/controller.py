@@ -29,7 +29,7 @@ class Potential:
     def act(self, observation: Observation) -> tuple[float, float]:
         """Go where the sum of the forces points, as fast as it is large."""
         x, y = observation.pose.x, observation.pose.y
-        fx, fy = along_lane(self._navigator, observation, self._bounds)
+        fx, fy = along_lane(self._navigator.look(observation), observation.pose, self._bounds)
         for car in observation.others:
             ax, ay = x - car.pose.x, y - car.pose.y
             away = hypot(ax, ay)

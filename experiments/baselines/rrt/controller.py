@@ -16,7 +16,7 @@ import dubins_traffic as dt
 from dubins_traffic.cars.state import Observation, Pose
 from dubins_traffic.controllers.navigator import Situation
 from dubins_traffic.problem.instance import Problem
-from experiments.baselines.following import LOOK, along_lane, toward
+from experiments.baselines.following import LOOK, along_lane, at_top_speed, toward
 
 HOLD: Final = 15
 """Ticks for which a plan is kept."""
@@ -66,10 +66,8 @@ class Rrt:
         while self._path and hypot(self._path[0][0] - pose.x, self._path[0][1] - pose.y) < LOOK:
             del self._path[0]
         if not self._path:
-            return toward(pose, self._bounds, *along_lane(self._navigator, observation, self._bounds))
-        dx, dy = self._path[0][0] - pose.x, self._path[0][1] - pose.y
-        share = self._bounds.speed / max(hypot(dx, dy), 1e-9)
-        return toward(pose, self._bounds, share * dx, share * dy)
+            return toward(pose, self._bounds, *along_lane(here, pose, self._bounds))
+        return toward(pose, self._bounds, *at_top_speed(pose, self._bounds, *self._path[0]))
 
     def _planned(self, observation: Observation, here: Situation) -> list[tuple[float, float]] | None:
         """Return the places of a path past the others; none where the lane is free, None where none was found."""
