@@ -5,11 +5,13 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import threading
 import time
 from pathlib import Path
 
 import pytest
 
+from dubins_traffic.cli import signals
 from dubins_traffic.cli.main import main
 
 DROPPED = """
@@ -76,6 +78,26 @@ def test_one_that_python_drops_is_heard_all_the_same(
     Path("mine.py").write_text(DROPPED)
     assert main(["run", "demo", "--controller", "mine.py:Ringing", "--trials", "3"]) == 1
     assert capsys.readouterr() == ("", "dubins-traffic: interrupted after 0 of 3 trials\n")
+
+
+def test_one_that_comes_while_a_dropped_one_is_heard_is_not_dropped(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """On a busy machine the thread that presses again may be done before the one that began it has gone on."""
+
+    press, press_soon, pressed = signals._press, signals._press_soon, threading.Event()
+
+    def press_and_tell() -> None:
+        press()
+        pressed.set()
+
+    def go_on_late() -> None:
+        press_soon()
+        pressed.wait()
+
+    monkeypatch.setattr(signals, "_press", press_and_tell)
+    monkeypatch.setattr(signals, "_press_soon", go_on_late)
+    test_one_that_python_drops_is_heard_all_the_same(tmp_path, monkeypatch, capsys)
 
 
 IN_A_TEXT = """

@@ -27,11 +27,17 @@ def heard_again() -> Generator[None]:
     before = sys.unraisablehook
 
     def hear(dropped: sys.UnraisableHookArgs) -> None:
-        if issubclass(dropped.exc_type, KeyboardInterrupt):
-            _as_if_unheard()
-            threading.Thread(target=_press, daemon=True).start()
-        else:
+        if not issubclass(dropped.exc_type, KeyboardInterrupt):
             before(dropped)
+            return
+        again = True
+        while again:
+            try:
+                _as_if_unheard()
+                _press_soon()
+                again = False
+            except KeyboardInterrupt:
+                again = True  # it came in here: Python would drop it for good
 
     sys.unraisablehook = hear
     try:
@@ -68,6 +74,10 @@ def _as_if_unheard() -> None:
     if threading.current_thread() is threading.main_thread():
         while _heard:
             signal.signal(*_heard.popitem())
+
+
+def _press_soon() -> None:
+    threading.Thread(target=_press, daemon=True).start()
 
 
 def _press() -> None:

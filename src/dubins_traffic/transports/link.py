@@ -136,7 +136,8 @@ class Link:
         self.inbox.stale()
         self.transport.announce(self._instance)
         self._announced = monotonic()
-        self._send()
+        # Frame 0 has been shown before. Who answers that as soon as the problem is there may not answer it again.
+        self._send_new()
         if self.ego and not self._patience.at_once:
             self._first_command(self.inbox.slot(EGO_NAME))
         self.clock.start(self._instance.problem.period, monotonic())
@@ -392,6 +393,9 @@ class Link:
 
     def _send(self) -> None:
         self.inbox.stale()
+        self._send_new()
+
+    def _send_new(self) -> None:
         self._returned, self._repeated = self.inbox.returned, False
         self._sent = monotonic()
         self._send_again()
