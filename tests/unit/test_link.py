@@ -22,10 +22,10 @@ class Prompt:
     def open(self, mailbox: Mailbox) -> None:
         self.mailbox = mailbox
 
-    def begin(self, instance: Instance, remote: Sequence[str]) -> None:
+    def begin(self, instance: Instance, remote: Sequence[str]) -> None:  # noqa: ARG002  # any
         self.answered = -1
 
-    def announce(self, instance: Instance) -> None:
+    def announce(self, instance: Instance) -> None:  # noqa: ARG002  # any
         self.answer(0)
 
     def frame(self, view: View) -> None:
