@@ -15,8 +15,8 @@ from tests.architecture.house import modules
 TOUCHED = {
     "e-agent": (r'"parked"|\bParked\b', {"agents.kinds", "problem.kinds"}),
     "metric": (
-        r"scoring\.time_to_collision|TimeToCollision\b",
-        {"scoring.registry", "scoring.time_to_collision"},
+        r"surrogates\.time_to_collision|TimeToCollision\b",
+        {"surrogates.time_to_collision"},  # and its line in pyproject.toml
     ),
     "transport": (r"sessions\.stdio|run_over_stdio\b", {"sessions.registry", "sessions.stdio"}),
     "map format": (

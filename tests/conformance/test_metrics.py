@@ -30,7 +30,7 @@ from tests.property.test_batch import SEED, configuration, plain
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "extending" / "my_metric.py"
 METRICS: tuple[str, ...] = (
-    *registry.BUILT_IN,
+    *registry.names(),
     f"{EXAMPLE}:Turning",
     f"{ROOT / 'tests' / 'witness.py'}:Witness",
 )
@@ -76,7 +76,7 @@ def test_it_says_what_it_tells(spec: str) -> None:
         assert column.label
         assert column.better in (-1, 0, 1)
         assert "\n" not in column.label + column.unit + column.meaning
-        assert column.meaning or spec not in registry.BUILT_IN
+        assert column.meaning or spec not in registry.names()
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -1,7 +1,7 @@
-"""Metrics by name: those that come with the package, those of other packages, and a user's own.
+"""Metrics by name: the one that trials may have unasked, those that packages offer, and a user's own.
 
-The values that every score has stand in `scoring.score.Score`; the metrics here are added on request. A new one is a
-file beside this one and a line in `BUILT_IN`, or a class outside the package (docs/extending/metric.md).
+The values that every score has stand in `scoring.score.Score`; the metrics here are added on request. This package
+offers its own as others do, by entry points (docs/extending/metric.md).
 """
 
 from __future__ import annotations
@@ -22,9 +22,8 @@ STRATEGY_SHARE = "strategy_share"
 """The metric that every trial has whose ego plays a strategy of another tool."""
 BUILT_IN = {
     STRATEGY_SHARE: ("dubins_traffic.scoring.strategy_share", "StrategyShare"),
-    "time_to_collision": ("dubins_traffic.scoring.time_to_collision", "TimeToCollision"),
 }
-"""The metrics of this package by name: module and class."""
+"""The metrics that core knows by name: module and class."""
 GROUP = "dubins_traffic.metrics"
 """Group of the entry points by which other packages offer metrics."""
 OPTION = "--metric"

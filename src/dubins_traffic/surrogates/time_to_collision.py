@@ -12,12 +12,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Frames
-from dubins_traffic.cars.tables import pack_cars
+from dubins_traffic.cars.state import Frames
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.scoring.metric import Column, Value
+from dubins_traffic.surrogates.pairs import Others, others_of, touching_distance
 
 THRESHOLD = 1.5
 """Seconds to a collision below which the ego is exposed."""
@@ -51,7 +51,7 @@ class TimeToCollision:
 
     def begin(self, instance: Instance) -> None:
         """Start without a frame."""
-        self._touch = 2.0 * float(pack_cars([instance.problem.car]).reach[0])
+        self._touch = touching_distance(instance.problem)
         self._least = math.inf
         self._exposed = 0
         self._count = 0
@@ -61,7 +61,7 @@ class TimeToCollision:
         self._count += len(frames)
         if frames.x.shape[1] == 1 or not len(frames):
             return
-        least = time_to_touch(*_relative(frames), self._touch).min(axis=1)
+        least = time_to_touch(others_of(frames), self._touch).min(axis=1)
         self._least = min(self._least, float(least.min()))
         self._exposed += int(np.count_nonzero(least < THRESHOLD))
 
@@ -76,23 +76,9 @@ class TimeToCollision:
         }
 
 
-def _relative(frames: Frames) -> tuple[Floats, Floats, Floats, Floats]:
-    """Return where the others are, and how fast they move, as seen from the ego: x, y, vx, vy, (F, N - 1)."""
-    vx, vy = frames.speed * frames.c, frames.speed * frames.s
-    found = [array[:, EGO + 1 :] - array[:, EGO, None] for array in (frames.x, frames.y, vx, vy)]
-    return found[0], found[1], found[2], found[3]
-
-
-def time_to_touch(x: Floats, y: Floats, vx: Floats, vy: Floats, touch: float) -> Floats:
-    """Return the seconds until points come as near as `touch` to the origin, infinite where they never do.
-
-    Parameters
-    ----------
-    x, y, vx, vy : (F, N)
-        Places in metres and velocities in m/s.
-    touch : float
-        Metres.
-    """
+def time_to_touch(others: Others, touch: float) -> Floats:
+    """Return the seconds until other cars come as near as `touch` (m), infinite where they never do: (F, N - 1)."""
+    x, y, vx, vy = others
     square = vx * vx + vy * vy
     closing = -(x * vx + y * vy)
     over = x * x + y * y - touch * touch
