@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from typing import Final
 
 import numpy as np
+import numpy.typing as npt
 
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.kernels.arrays import Floats
@@ -82,7 +83,7 @@ class PostEncroachment:
         return float(places.shape[1] - 1 - when[-1]) if len(when) else math.inf
 
 
-def _overlap(ego: Floats, others: Floats, touch: float) -> Floats:
+def _overlap(ego: Floats, others: Floats, touch: float) -> npt.NDArray[np.bool_]:
     """Tell for places of the ego and of others, (2, K or 1, N - 1 or 1), whether they are nearer than `touch`."""
     x, y = others - ego
     return x * x + y * y < touch * touch
