@@ -289,21 +289,25 @@ def test_a_margin_that_is_no_number_is_refused(below: str, capsys: pytest.Captur
 
 
 @WHO
-def test_a_search_names_the_fault_and_tests_nothing_by_it(
+def test_a_search_names_the_fault_keeps_it_and_tests_nothing_by_it(
     who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     arguments = ["falsify", "junction", "--controller", f"own.py:{who}", "-o", "out"]
     for trials, more in (("32", []), ("64", ["--resume"])):
         assert main([*arguments, "--trials", trials, *more]) == 1
         out, err = capsys.readouterr()
-        assert f"{trials} ended by a fault; 0 kinds of failure" in out
+        assert "the ego broke a rule in 0, " in out
+        assert f"{trials} ended by a fault; " in out
         assert (
             f"{trials} of {trials} trials ended by a fault ({trials} {end}); the first: trial 0: {end}: "
             in err
         )
         assert reason in err
     report = json.loads(Path("out/search.json").read_text())
-    assert (report["faulty"], report["faults"]) == (64, {end: 64})
+    assert (report["faulty"], report["faults"], report["violated"]) == (64, {end: 64}, 0)
+    assert {name.partition("-")[0] for name in report["cases"]} == {end}
+    assert all(f"the controller ended the trial: {end}: " in own for own in report["cases"].values())
+    assert all(reason in own for own in report["cases"].values())
     assert all(row["tested"] == 0 for row in report["coverage"])
 
 

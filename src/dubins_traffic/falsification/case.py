@@ -29,6 +29,7 @@ from dubins_traffic.files import require_output, write_text
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.files import DOCUMENTS, parse_json, read_source
 from dubins_traffic.record.reader import Record, read
+from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.margins import LIVENESS
@@ -159,6 +160,8 @@ def sentence_of(record: Record, score: Score, breach: Violation) -> str:
             return f"At {breach.time:.2f} s the formula became false, the ego being at {place}."
         case "3.stop" | "3.order" | "3.clear":
             return f"{when} entered the crossing at {_crossing(breach)} {_entry(record, breach)}."
+        case rule if rule in BY_CONTROLLER:
+            return f"At {breach.time:.2f} s the controller ended the trial: {record.ending}."
         case rule:
             return f"{when} broke {rule} near ({breach.where.x:.1f}, {breach.where.y:.1f}) m."
 
@@ -242,10 +245,12 @@ class Judged:
         return self.first(rule) if verdict.verdict is Ruling.VIOLATED else None
 
     def first(self, rule: str) -> Violation | None:
-        """Return the ego's first breach of a rule, formula or goal (`liveness`), whatever others did."""
+        """Return the ego's first breach of a rule, formula or goal (`liveness`), or the end that it brought about."""
         verdict, frames = self.score.verdict, self.record.frames
         if rule == LIVENESS:
             return self._overdue()
+        if rule in BY_CONTROLLER:
+            return self._ended_by(rule)
         if rule in contract.CONTRACT:
             ticks = [tick for cell, tick in self.tried.cells if cell.rule == rule]
             return contract.breach_of(rule, ticks[0], verdict, self.record) if verdict and ticks else None
@@ -259,6 +264,15 @@ class Judged:
         tick = round(time * frames.rate)
         place = Place(float(frames.x[tick, EGO]), float(frames.y[tick, EGO]), None, None)
         return Violation(rule, EGO_NAME, time, tick, time, place)
+
+    def _ended_by(self, end: str) -> Violation | None:
+        """Return where the ego was when its controller ended the trial so."""
+        ending, frames = self.record.ending, self.record.frames
+        if ending is None or ending.end != end:
+            return None
+        time = ending.ticks / frames.rate
+        place = Place(float(frames.x[ending.ticks, EGO]), float(frames.y[ending.ticks, EGO]), None, None)
+        return Violation(end, EGO_NAME, time, ending.ticks, time, place)
 
     def _overdue(self) -> Violation | None:
         """Return where the ego was when a goal had not been visited for too long."""
@@ -306,12 +320,16 @@ def cut_to(instance: Instance, tick: int) -> Instance:
 
 
 def confirm(instance: Instance, rule: str, make: Make, name: str) -> Judged | None:
-    """Return what the judge says of an instance that is cut to the ego's breach of a rule; None if none stands."""
+    """Return what the judge says of an instance that is cut to the ego's breach of a rule; None if none stands.
+
+    An end that the ego's controller brings about comes in the tick after its frame.
+    """
     first = judge(instance, make, name)
     breach = first.first(rule)
     if breach is None:
         return None
-    cut = judge(cut_to(instance, breach.tick), make, name)
+    last = min(breach.tick + 1, instance.ticks) if rule in BY_CONTROLLER else breach.tick
+    cut = judge(cut_to(instance, last), make, name)
     return cut if cut.breach(rule) is not None else None
 
 

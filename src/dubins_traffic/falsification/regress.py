@@ -33,8 +33,8 @@ class CaseOutcome:
     verdict: str
     """The ruling, or how the trial ended if by a fault."""
     broken: tuple[str, ...]
-    """The rules that the ego broke before the assumption fell, in order of time, and the formula or goal that the
-    case is about.
+    """The rules that the ego broke before the assumption fell, in order of time, and the formula, goal or end that
+    the case is about.
     """
     sentence: str
     """Who did what when; empty if the ego broke nothing."""

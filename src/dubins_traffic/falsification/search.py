@@ -39,6 +39,7 @@ from dubins_traffic.logic.monitor import Monitors
 from dubins_traffic.logic.parse import parse
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.scoring.margins import LIVENESS
 from dubins_traffic.scoring.verdict import EGO_RULES
 from dubins_traffic.trial.interrupts import WHOLE, heard_between_frames
@@ -261,15 +262,17 @@ class Search:
         """Count a trial; tell whether it broke a rule."""
         counts, wanted = self.counts, self._wanted(tried)
         counts.discarded += tried.discarded
-        counts.violated += bool(wanted)
+        broken = any(cell.rule in self._targets for cell in wanted)
+        counts.violated += broken
         np.add.at(counts.exercised, np.array(tried.exercised, dtype=np.int64), 1)
         for cell in wanted:
             if cell.number >= 0:
                 counts.broken[cell.number] += 1
-        return bool(wanted)
+        return broken
 
     def _wanted(self, tried: Tried) -> list[Cell]:
-        return [cell for cell, _ in tried.cells if cell.rule in self._targets]
+        """Return what a trial shows of what is asked for, and of ends that the ego's controller brought about."""
+        return [cell for cell, _ in tried.cells if cell.rule in self._targets or cell.rule in BY_CONTROLLER]
 
     def _judged(
         self, numbers: range, instances: Sequence[Instance], tried: Sequence[Tried]

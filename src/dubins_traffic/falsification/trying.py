@@ -63,8 +63,9 @@ class Tried:
     rounds, then the share of the goals visited, then metres.
     """
     cells: tuple[tuple[Cell, int], ...]
-    """The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame; and
-    the frames in which the contract was broken, of discarded trials too.
+    """The first breach of each rule by the ego, and its frame, in order of time; of `LIVENESS` the last frame, and of
+    the end, by its name, if the ego's controller brought it about; and the frames in which the contract was broken, of
+    discarded trials too.
     """
     situations: tuple[int, ...] = ()
     """What it met with (`passages.Passages.situations`); empty where nobody asks for it."""
@@ -252,6 +253,7 @@ def tried_of(
         rate = instance.problem.rate
         first |= {rule: round(time * rate) for rule, time in broken_formulas(score).items()}
         first |= {LIVENESS: ending.ticks} if ending is not None and late is not None and late < 0.0 else {}
+    first |= {ending.end.value: ending.ticks} if ending is not None and ending.by_controller else {}
     discarded = verdict.verdict is Ruling.EXCUSED or (not breaches and assumption_broken)
     contract = ContractMargins() if fault else contract_margins(verdict, passages, trial, instance)
     margins |= contract.margins
