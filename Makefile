@@ -44,6 +44,8 @@ test-all: test test-tools ## all tests, then those of which the suite runs a par
 	DUBINS_TRAFFIC_SPECIFICATIONS=full $(BIN)/python -m pytest tests/crosscheck/test_game_specifications.py
 	@scripts/crosscheck-tools.sh acacia
 	$(BIN)/python -m pytest tests/crosscheck/acacia_winners.py
+	@scripts/crosscheck-tools.sh learners
+	$(BIN)/python -m pytest tests/crosscheck/learners.py
 	$(BIN)/python -m tests.judge_trials 500
 	$(BIN)/python -m tests.judge_trials 2000 bent
 	DUBINS_TRAFFIC_CONTRACT=full $(BIN)/python -m pytest tests/conformance/test_contract.py \

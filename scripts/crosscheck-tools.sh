@@ -2,7 +2,8 @@
 # Installs the tools with which some tests compare, each in an environment of its own in build/crosscheck:
 # Spot, stormpy (carries another Spot), rtamt, TuLiP, ltlf2dfa, omega with dd, SUMO, commonroad-io, Lanelet2, rclpy of two
 # versions of ROS 2 with Fast DDS, RVO2 and CasADi; and Debian's spin and mona.
-# With the argument `acacia` Acacia-Bonsai as well, which wants Python 3.13. What is there already is left alone.
+# With the argument `acacia` Acacia-Bonsai as well, which wants Python 3.13, and with `learners` Stable-Baselines3, which
+# brings gigabytes. What is there already is left alone.
 # Where something can't be installed it says so in one line; the status is 0 either way.
 # Two are installed at a time, by the pip of .venv: to put one into each environment takes longer than most of the tools.
 set -euo pipefail
@@ -63,6 +64,10 @@ if [ "${1:-}" = acacia ]; then
   else
     echo "crosscheck-tools: Acacia-Bonsai wants Python 3.13, which is not here"
   fi
+fi
+
+if [ "${1:-}" = learners ]; then
+  environment learners stable_baselines3 -r experiments/baselines/ppo/constraints.txt '.[rl]'
 fi
 
 missing=()

@@ -13,19 +13,20 @@ cost, divided by one and the multiplier).
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
 from gymnasium.spaces import Box
+from gymnasium.vector import AutoresetMode
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
-from stable_baselines3.common.vec_env import VecEnv
+from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper
 
 from dubins_traffic.envs.episodes import Levels
 from dubins_traffic.envs.parallel_vector import TrafficParallelVectorEnv
+from dubins_traffic.envs.stable_baselines import vec_env
 from dubins_traffic.envs.vector import TrafficVectorEnv
 from dubins_traffic.learning.actions import CHOICES
 from dubins_traffic.learning.policy import Policy
@@ -37,65 +38,28 @@ BUDGET, RATE = 1.0, 0.05
 """Breaches that an episode may cost, and how fast the multiplier follows."""
 
 
-class Vectorized(VecEnv):
-    """A vector environment with the interface of Stable-Baselines3; it may charge costs with a multiplier."""
+class Charged(VecEnvWrapper):
+    """Takes a multiple of the cost from the reward, and notes what each episode has cost."""
 
-    def __init__(self, env: TrafficVectorEnv | Shielded) -> None:
-        super().__init__(env.num_envs, env.single_observation_space, env.single_action_space)
-        self.env, self.multiplier = env, 0.0
+    def __init__(self, venv: VecEnv) -> None:
+        super().__init__(venv)
+        self.multiplier = 0.0
         self.costs: list[float] = []
-        self._spent = np.zeros(env.num_envs)
-        self._seed: int | None = None
+        self._spent = np.zeros(venv.num_envs)
 
     def reset(self) -> Any:
-        """Begin the first episodes of the seed, or the next ones."""
-        observations, _ = self.env.reset(seed=self._seed)
-        self._seed = None
-        return observations
-
-    def step_async(self, actions: Any) -> None:
-        """Note what is to be done."""
-        self._actions = actions
+        """Begin the next episodes."""
+        return self.venv.reset()
 
     def step_wait(self) -> Any:
-        """Do it."""
-        observations, rewards, terminated, truncated, info = self.env.step(self._actions)
-        over = terminated | truncated
-        self._spent += info["cost"]
-        rewards = (rewards - self.multiplier * info["cost"]) / (1.0 + self.multiplier)
-        infos: list[dict[str, Any]] = [{} for _ in over]
-        for env in np.flatnonzero(over):
-            infos[env] = {
-                "terminal_observation": info["final_obs"][env], "TimeLimit.truncated": bool(truncated[env]),
-            }  # fmt: skip
-            self.costs.append(float(self._spent[env]))
-            self._spent[env] = 0.0
-        return observations, rewards.astype(np.float32), over, infos
-
-    def close(self) -> None:
-        """Close the environments."""
-        self.env.close()
-
-    def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Begin with the episodes of a seed at the next reset."""
-        self._seed = seed
-        return [seed] * self.num_envs
-
-    def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """Return an attribute for each environment; all have the same."""
-        return [getattr(self.env, attr_name)] * len(list(self._get_indices(indices)))
-
-    def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:  # noqa: ARG002  # all are one
-        """Set an attribute of all environments."""
-        setattr(self.env, attr_name, value)
-
-    def env_method(self, method_name: str, *args: Any, indices: Any = None, **kwargs: Any) -> list[Any]:
-        """Refuse: all environments are one object."""
-        raise NotImplementedError(method_name)
-
-    def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:  # noqa: ARG002  # none is
-        """Tell that no environment has a wrapper."""
-        return [False] * self.num_envs
+        """Take the step."""
+        observations, rewards, over, infos = self.venv.step_wait()
+        cost = np.array([info["cost"] for info in infos])
+        self._spent += cost
+        self.costs += self._spent[over].tolist()
+        self._spent[over] = 0.0
+        charged = (rewards - self.multiplier * cost) / (1.0 + self.multiplier)
+        return observations, charged.astype(np.float32), over, infos
 
 
 class Shielded:
@@ -103,6 +67,7 @@ class Shielded:
 
     def __init__(self, env: TrafficParallelVectorEnv) -> None:
         self._env, self.num_envs, self.settings = env, env.num_envs, env.settings
+        self.autoreset_mode, self.render_mode = AutoresetMode.SAME_STEP, None
         self._size = env.settings.layout.size
         self.single_observation_space = Box(-1.0, 1.0, (self._size,), np.float32)
         self.single_action_space = env.single_action_space
@@ -115,11 +80,15 @@ class Shielded:
     def step(self, actions: Any) -> Any:
         """Hold the actions of the egos."""
         seen, rewards, terminated, truncated, info = self._env.step(np.asarray(actions)[:, None])
-        told: dict[str, Any] = {"cost": info["cost"][:, 0], "final_obs": dict[int, Any]()}
+        told: dict[str, Any] = {"cost": info["cost"][:, 0], "final_obs": dict[int, Any](), "final_info": {}}
         if "ended" in info:
             last = info["final_obs"][:, 0, : self._size]
             told["final_obs"] = dict(zip(info["ended"].tolist(), last, strict=True))
         return seen[:, 0, : self._size], rewards[:, 0], terminated, truncated, told
+
+    def get_attr(self, name: str) -> tuple[Any, ...]:
+        """Return an attribute for each environment; all have the same."""
+        return (getattr(self, name),) * self.num_envs
 
     def close(self) -> None:
         """Do nothing: there is nothing to close."""
@@ -164,7 +133,7 @@ def train(seed: int, steps: int, *, lagrangian: bool, shielded: bool) -> Policy:
     torch.set_num_threads(1)
     env = environments(shielded=shielded)
     model = PPO(
-        "MlpPolicy", Vectorized(env), n_steps=128, batch_size=2048, n_epochs=5, gamma=GAMMA, gae_lambda=0.95,
+        "MlpPolicy", Charged(vec_env(env)), n_steps=128, batch_size=2048, n_epochs=5, gamma=GAMMA, gae_lambda=0.95,
         ent_coef=0.01, learning_rate=3e-4, seed=seed, device="cpu",
         policy_kwargs={"net_arch": HIDDEN, "activation_fn": torch.nn.Tanh},
     )  # fmt: skip
