@@ -30,14 +30,13 @@ def heard_again() -> Generator[None]:
         if not issubclass(dropped.exc_type, KeyboardInterrupt):
             before(dropped)
             return
-        again = True
-        while again:
+        while True:
             try:
                 _as_if_unheard()
                 _press_soon()
-                again = False
             except KeyboardInterrupt:
-                again = True  # it came in here: Python would drop it for good
+                continue  # it came in here: Python would drop it for good
+            return
 
     sys.unraisablehook = hear
     try:

@@ -249,8 +249,6 @@ class Judged:
         verdict, frames = self.score.verdict, self.record.frames
         if rule == LIVENESS:
             return self._overdue()
-        if rule in BY_CONTROLLER:
-            return self._ended_by(rule)
         if rule in contract.CONTRACT:
             ticks = [tick for cell, tick in self.tried.cells if cell.rule == rule]
             return contract.breach_of(rule, ticks[0], verdict, self.record) if verdict and ticks else None
@@ -258,21 +256,16 @@ class Judged:
         for broken in violations:
             if broken.car == EGO_NAME and broken.rule == rule:
                 return broken
-        time = broken_formulas(self.score).get(rule)
+        ending = self.record.ending
+        if ending is not None and ending.by_controller and ending.end == rule:
+            time = ending.ticks / frames.rate
+        else:
+            time = broken_formulas(self.score).get(rule)
         if time is None:
             return None
         tick = round(time * frames.rate)
         place = Place(float(frames.x[tick, EGO]), float(frames.y[tick, EGO]), None, None)
         return Violation(rule, EGO_NAME, time, tick, time, place)
-
-    def _ended_by(self, end: str) -> Violation | None:
-        """Return where the ego was when its controller ended the trial so."""
-        ending, frames = self.record.ending, self.record.frames
-        if ending is None or ending.end != end:
-            return None
-        time = ending.ticks / frames.rate
-        place = Place(float(frames.x[ending.ticks, EGO]), float(frames.y[ending.ticks, EGO]), None, None)
-        return Violation(end, EGO_NAME, time, ending.ticks, time, place)
 
     def _overdue(self) -> Violation | None:
         """Return where the ego was when a goal had not been visited for too long."""

@@ -6,8 +6,6 @@ Definitions 1 and 2. The ego may react late; it drives at its top speed at most.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -15,9 +13,8 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Frames
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.record.sink import Ending
-from dubins_traffic.scoring.metric import Column, Value
-from dubins_traffic.surrogates.pairs import others_of, touching_distance
+from dubins_traffic.scoring.metric import Column
+from dubins_traffic.surrogates.pairs import LeastOfPairs, others_of
 
 RESPONSE: Final = 0.5
 """Seconds in which a car may do anything before it brakes."""
@@ -59,7 +56,7 @@ class Safe(NamedTuple):
         return np.where(other < 0.0, self.path(ego) + self.path(np.abs(other)), ahead)
 
 
-class ResponsibilitySensitiveSafety:
+class ResponsibilitySensitiveSafety(LeastOfPairs):
     """Least distance beyond that of responsibility-sensitive safety to a car in the ego's way, and the share below it.
 
     In a frame in which the ego drives, a car is in its way if the discs around their bodies would meet if the ego went
@@ -86,42 +83,21 @@ class ResponsibilitySensitiveSafety:
         ),
     )
 
+    threshold = 0.0
+
     def begin(self, instance: Instance) -> None:
         """Start without a frame."""
-        problem = instance.problem
-        self._touch = touching_distance(problem)
-        self._safe = Safe(problem.car.bounds.speed)
-        self._least = math.inf
-        self._below = 0
-        self._count = 0
+        super().begin(instance)
+        self._safe = Safe(instance.problem.car.bounds.speed)
 
-    def frames(self, frames: Frames) -> None:
-        """Take a block of frames."""
-        self._count += len(frames)
-        if frames.x.shape[1] == 1 or not len(frames):
-            return
-        least = self._margins(frames).min(axis=1)
-        self._least = min(self._least, float(least.min()))
-        self._below += int(np.count_nonzero(least < 0.0))
-
-    def end(self, ending: Ending) -> None:
-        """Nothing is left to do."""
-
-    def result(self) -> Mapping[str, Value]:
-        """Return the least margin and the share up to the last frame."""
-        return {
-            "min_rss_margin_m": None if math.isinf(self._least) else self._least,
-            "below_rss_share": self._below / max(1, self._count),
-        }
-
-    def _margins(self, frames: Frames) -> Floats:
+    def values(self, frames: Frames) -> Floats:
         """Return by how much (m) each other car is farther than RSS asks for, infinite out of the way: (F, N - 1)."""
         speed = frames.speed[:, EGO, None]
         forward = np.sign(speed)
         c, s = forward * frames.c[:, EGO, None], forward * frames.s[:, EGO, None]
         seen = others_of(frames)
         ahead, beside = seen.x * c + seen.y * s, seen.y * c - seen.x * s
-        square = self._touch * self._touch - beside * beside
+        square = self.touch * self.touch - beside * beside
         in_way = (ahead > 0.0) & (square > 0.0) & (forward != 0.0)
         gap = ahead - np.sqrt(np.maximum(square, 0.0))
         ego = np.abs(speed)

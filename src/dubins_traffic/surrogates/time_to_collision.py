@@ -7,23 +7,18 @@ exposed).
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
-
 import numpy as np
 
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.problem.instance import Instance
-from dubins_traffic.record.sink import Ending
-from dubins_traffic.scoring.metric import Column, Value
-from dubins_traffic.surrogates.pairs import Others, others_of, touching_distance
+from dubins_traffic.scoring.metric import Column
+from dubins_traffic.surrogates.pairs import LeastOfPairs, Others, others_of
 
 THRESHOLD = 1.5
 """Seconds to a collision below which the ego is exposed."""
 
 
-class TimeToCollision:
+class TimeToCollision(LeastOfPairs):
     """Least time to a collision with another car, and the share of frames in which it is below 1.5 s.
 
     At each frame both cars go on at their present speeds and headings, and each is the disc around its body. The time
@@ -49,31 +44,11 @@ class TimeToCollision:
         ),
     )
 
-    def begin(self, instance: Instance) -> None:
-        """Start without a frame."""
-        self._touch = touching_distance(instance.problem)
-        self._least = math.inf
-        self._exposed = 0
-        self._count = 0
+    threshold = THRESHOLD
 
-    def frames(self, frames: Frames) -> None:
-        """Take a block of frames."""
-        self._count += len(frames)
-        if frames.x.shape[1] == 1 or not len(frames):
-            return
-        least = time_to_touch(others_of(frames), self._touch).min(axis=1)
-        self._least = min(self._least, float(least.min()))
-        self._exposed += int(np.count_nonzero(least < THRESHOLD))
-
-    def end(self, ending: Ending) -> None:
-        """Nothing is left to do."""
-
-    def result(self) -> Mapping[str, Value]:
-        """Return the least time and the share up to the last frame."""
-        return {
-            "min_time_to_collision_s": None if math.isinf(self._least) else self._least,
-            "time_exposed_share": self._exposed / max(1, self._count),
-        }
+    def values(self, frames: Frames) -> Floats:
+        """Return the seconds until the ego and each other car would touch, (F, N - 1)."""
+        return time_to_touch(others_of(frames), self.touch)
 
 
 def time_to_touch(others: Others, touch: float) -> Floats:
