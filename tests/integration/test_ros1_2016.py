@@ -7,8 +7,10 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -89,6 +91,31 @@ def test_the_maestro_of_2016_runs_the_trials_of_our_world(tmp_path: Path) -> Non
         assert record.frames.command_speed[-1, 0] == 0.3
         assert record.frames.x[-1, 0] > 0.0
     assert [row["end"] for row in json.loads(out)["trials"]] == ["duration"] * 3
+
+
+def test_a_trial_is_whole_by_the_clock_of_the_maestro_though_the_cars_moved_for_less(tmp_path: Path) -> None:
+    """The session stands still for a second, as on a busy machine: it can't be caught up."""
+    need_ros()
+    document = json.loads(configuration(tmp_path, number_trials=1, duration_bounds=[3, 3]).read_text())
+    del document["duration"]
+    config, records = tmp_path / "old.json", tmp_path / "out"
+    config.write_text(json.dumps(document))
+    with graph(tmp_path) as ros:
+        session = ros.session(config, "--maestro-elsewhere", "--controller", "lanes", "--records", records)
+        read_until(session, "waiting for a problem instance")
+        messages = str(ros.client_messages())
+        ros.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_maestro.py"], PYTHONPATH=messages)
+        ros.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_2016.py", "1"], ROS_NAMESPACE="ego", PYTHONPATH=messages)
+        read_until(session, "begins")
+        session.send_signal(signal.SIGSTOP)
+        time.sleep(1.2)
+        session.send_signal(signal.SIGCONT)
+        status, _, err = finish(session)
+        assert status == 0, err
+    record = dt.load_record(records / "trial-0000.mcap")
+    assert record.ending is not None
+    assert record.ending.end is End.DURATION
+    assert record.instance.duration == record.ending.ticks / 30 < 2.5
 
 
 def test_a_reset_of_the_maestro_of_2016_is_a_reset(tmp_path: Path) -> None:

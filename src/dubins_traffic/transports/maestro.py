@@ -6,6 +6,7 @@ from collections.abc import Callable, Generator
 from contextlib import contextmanager
 from enum import Enum, IntEnum
 from threading import Condition, Lock
+from time import monotonic
 
 from dubins_traffic.errors import TransportError
 
@@ -139,6 +140,7 @@ class ForeignMaestro:
         self._told: str | None = None
         self._text = ""
         self._over = True
+        self._began = self._ended = monotonic()
         self.news: Callable[[], None] = lambda: None
         """Called when a problem has been told, or a trial is over."""
 
@@ -149,6 +151,10 @@ class ForeignMaestro:
                 return
             self._text = text
             self._told, self._over = (text, False) if text else (None, True)
+            if text:
+                self._began = monotonic()
+            else:
+                self._ended = monotonic()
         self.news()
 
     @property
@@ -160,6 +166,11 @@ class ForeignMaestro:
     def over(self) -> bool:
         """Whether no trial runs, for the maestro."""
         return self._over
+
+    @property
+    def lasted(self) -> float:
+        """Seconds of the wall since the latest problem was told, until the end was, if it was."""
+        return (self._ended if self._over else monotonic()) - self._began
 
     def take(self) -> str | None:
         """Return the problem that has been told, once."""
