@@ -66,7 +66,8 @@ CLAIMS: Mapping[str, Claim] = {
         "some minutes",
     ),
     "towns": Claim(
-        "`rules` drives the two largest towns of SUMO clean among `lawful` cars, which break nothing either",
+        "`rules` drives the two largest towns of SUMO clean among `lawful` cars, which break nothing either; on ten "
+        "maps it makes counted rounds where goals are within reach",
         "maps.md",
         "some minutes",
     ),

@@ -129,7 +129,7 @@ def drive(number: int, seconds: float = DURATION, strategies: str | None = None)
         tuple(f"{time:.2f} {detail}" for time, kind, detail in events.found if kind == UNKNOWN_MOVE),
         result.score.rounds,
         free.rounds(seconds),
-        gap / round_time(own.problem),
+        gap / round_time(own.problem.network, own.problem.goal_vertices, own.problem.car.bounds.speed),
         result.wall.time_to_begin_s or 0.0,
     )
 

@@ -1,18 +1,19 @@
-"""How `rules` does among `lawful` cars on the two largest towns with one lane in each direction that come with SUMO.
+"""How `rules` does among `lawful` cars on maps that come with SUMO.
 
     python -m experiments towns
     python -m experiments.towns [TRIALS] [JOBS] [FIRST]
 
-Each town is imported from SUMO's own file, which `scripts/peers.sh sumo` installs if it is missing. Each trial is 300 s
-with 1 to 4 goals. The e-agents are `lawful` ones that wander or go between places: a sixteenth to a fourth as many as
-the town has lanes.
+Each map is imported from SUMO's own file, which `scripts/peers.sh sumo` installs if it is missing. Each trial is 300 s
+with 1 to 4 goals. In the two largest towns with one lane in each direction the goals lie anywhere, and the e-agents are
+`lawful` ones that wander or go between places: a sixteenth to a fourth as many as the town has lanes. On ten maps the
+goals are within reach (`goal_round_share`), and an eighth as many `lawful` cars as the map has lanes wander.
 """
 
 from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
@@ -21,6 +22,7 @@ from typing import Any
 
 from benchmarks.table import Row, show
 
+from dubins_traffic.files import read_text
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.maps.reduction import Reduction
 from dubins_traffic.maps.sumo import SumoNet
@@ -35,6 +37,21 @@ ENVIRONMENTS = (ROOT / "build" / "crosscheck" / "sumo", ROOT / "build" / "peers"
 GAMES = "lib/python*/site-packages/sumo/tools/game"
 TOWNS = {"DRT": "DRT/osm.net.xml", "bs3d": "bs3d/bs.net.xml"}
 """Files below `tools/game`."""
+MAPS = {
+    **TOWNS,
+    "A10KW": "A10KW/osm.net.xml",
+    "corridor": "corridor/corridor.net.xml",
+    "fokr_bs": "fokr_bs_demo/fokr_bs.net.xml.gz",
+    "grid6": "grid6/grid6.net.xml",
+    "hiking": "hiking/hiking.net.xml",
+    "kuehne": "kuehne/kuehne.net.xml",
+    "ramp": "ramp/ramp.net.xml",
+    "square": "square/square.net.xml",
+}
+"""Files of the ten maps likewise."""
+WITHIN = {"goal_round_share": 0.4}
+ON_EACH, ENOUGH = 10, 8
+"""Trials on each of the ten maps, and in how many of them `rules` is to make counted rounds."""
 DURATION = 300.0
 TRIALS = 100
 SEED = 2016
@@ -52,6 +69,7 @@ class Drive:
     collisions: int
     distance: float
     rounds: int
+    counted: int
 
     @property
     def clean(self) -> bool:
@@ -70,7 +88,7 @@ def reduced(town: str) -> Reduction:
     folder = games()
     if folder is None:
         raise SystemExit("experiments: SUMO is not installed; scripts/peers.sh sumo says why")
-    return SumoNet().reduced((folder / TOWNS[town]).read_text())
+    return SumoNet().reduced(read_text(str(folder / MAPS[town])))
 
 
 def roads(town: str) -> dict[str, Any]:
@@ -85,10 +103,19 @@ def lanes(town: str) -> int:
 
 
 def instance(town: str, number: int, seconds: float = DURATION) -> Instance:
-    """Return the random instance of a number."""
+    """Return the random instance of a number, with goals anywhere."""
     draws = Draws(SEED, number, 919)
     goes = ("wander", "places")[draws.below(2)]
     count = draws.between(lanes(town) // 16, lanes(town) // 4)
+    return _drawn(town, number, seconds, count, goes)
+
+
+def within_reach(town: str, number: int, seconds: float = DURATION) -> Instance:
+    """Return the random instance of a number, with goals within reach."""
+    return _drawn(town, number, seconds, max(1, lanes(town) // 8), "wander", **WITHIN)
+
+
+def _drawn(town: str, number: int, seconds: float, count: int, goes: str, **more: Any) -> Instance:
     agents = [{"type": "lawful", "name": f"car{k}", "parameters": {"goes": goes}} for k in range(count)]
     configuration = {
         "version": 1,
@@ -100,12 +127,14 @@ def instance(town: str, number: int, seconds: float = DURATION) -> Instance:
         "number_goals_bounds": [1, 4],
         "rules": True,
     }
-    return draw(load_config(configuration), SEED, number)
+    return draw(load_config(configuration | more), SEED, number)
 
 
-def drive(number: int, town: str, seconds: float = DURATION) -> Drive:
+def drive(
+    number: int, town: str, seconds: float = DURATION, drawn: Callable[..., Instance] = instance
+) -> Drive:
     """Run `rules` on an instance."""
-    own = instance(town, number, seconds)
+    own = drawn(town, number, seconds)
     score = run_trial(own, "rules").score
     verdict = score.verdict
     assert verdict is not None
@@ -119,6 +148,7 @@ def drive(number: int, town: str, seconds: float = DURATION) -> Drive:
         len(score.collisions) + score.collisions_among_others,
         score.driven.distance_m,
         score.rounds,
+        score.counted_rounds,
     )
 
 
@@ -141,6 +171,19 @@ def bars(found: Sequence[Drive]) -> list[Row]:
     return rows
 
 
+def reached(found: Sequence[Drive]) -> list[Row]:
+    """Return the table of the ten maps."""
+    rows: list[Row] = []
+    for town in MAPS:
+        own = [one for one in found if one.town == town]
+        if own:
+            counted = sum(1 for one in own if one.counted)
+            agents, enough = own[0].agents, ENOUGH * len(own) / ON_EACH
+            says = f"{town}, goals within reach, {len(own)} trials among {agents} cars: with counted rounds"
+            rows.append(Row(says, str(counted), f">= {enough:g}", counted >= enough))
+    return rows
+
+
 def trials(count: int = TRIALS, jobs: int = 2, first: int = 0, seconds: float = DURATION) -> list[Drive]:
     """Run `count` trials in each town, in `jobs` processes, and print those that are not clean."""
     found: list[Drive] = []
@@ -153,16 +196,28 @@ def trials(count: int = TRIALS, jobs: int = 2, first: int = 0, seconds: float = 
     return found
 
 
+def reaches(jobs: int = 2, seconds: float = DURATION) -> list[Drive]:
+    """Run the trials on the ten maps, in `jobs` processes."""
+    with ProcessPoolExecutor(jobs) as pool:
+        return [
+            one
+            for town in MAPS
+            for one in pool.map(
+                partial(drive, town=town, seconds=seconds, drawn=within_reach), range(ON_EACH)
+            )
+        ]
+
+
 def measure() -> list[Row]:
     """Run all trials and return the table of the bars."""
     if games() is None:
         subprocess.run([str(ROOT / "scripts" / "peers.sh"), "sumo"], check=True)
-    return bars(trials())
+    return bars(trials()) + reached(reaches())
 
 
 def main() -> None:
     """Print what is remarkable, and the table."""
-    show("towns", bars(trials(*(int(argument) for argument in sys.argv[1:4]))))
+    show("towns", bars(trials(*(int(argument) for argument in sys.argv[1:4]))) + reached(reaches()))
 
 
 if __name__ == "__main__":

@@ -78,6 +78,15 @@ def test_rules_is_clean_there_among_lawful_cars(town: str, number: int) -> None:
     assert one.distance > 20.0
 
 
+@pytest.mark.parametrize("town", sorted({*towns.MAPS} - {"DRT"}))
+def test_rules_makes_counted_rounds_where_goals_are_within_reach(town: str) -> None:
+    """A sample of `experiments.towns`, which runs ten trials on each of the ten maps."""
+    assert folder().is_dir()
+    one = towns.drive(0, town, drawn=towns.within_reach)
+    assert one.clean
+    assert one.counted >= 2
+
+
 def test_the_same_town_by_way_of_opendrive(tmp_path: Path) -> None:
     source = folder() / "game" / "bs3d" / "bs.net.xml"
     command = [

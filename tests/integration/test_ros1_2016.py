@@ -105,7 +105,9 @@ def test_a_trial_is_whole_by_the_clock_of_the_maestro_though_the_cars_moved_for_
         read_until(session, "waiting for a problem instance")
         messages = str(ros.client_messages())
         ros.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_maestro.py"], PYTHONPATH=messages)
-        ros.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_2016.py", "1"], ROS_NAMESPACE="ego", PYTHONPATH=messages)
+        ros.start(
+            [SYSTEM_PYTHON, ROOT / "tests" / "ros_2016.py", "1"], ROS_NAMESPACE="ego", PYTHONPATH=messages
+        )
         read_until(session, "begins")
         session.send_signal(signal.SIGSTOP)
         time.sleep(1.2)

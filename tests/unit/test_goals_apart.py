@@ -10,7 +10,8 @@ import dubins_traffic as dt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem.configuration import load_config
-from dubins_traffic.problem.draw import Stream, draw, draw_goals, draw_many
+from dubins_traffic.problem.draw import Stream, draw, draw_many
+from dubins_traffic.problem.goals import draw_goals
 from dubins_traffic.roads.network import RoadNetwork
 from tests.shuttle import NAME, counted, document
 
@@ -28,7 +29,8 @@ def segments_between(roads: RoadNetwork, one: tuple[float, float], other: tuple[
 
 
 def goals(roads: RoadNetwork, count: int, apart: int, seed: int = 0) -> tuple[tuple[float, float], ...]:
-    return draw_goals(roads, (count, count), Draws(seed, 0, Stream.GOALS), apart)
+    picks = draw_goals(roads, (count, count), Draws(seed, 0, Stream.GOALS), apart).vertices
+    return tuple(roads.intersections[v] for v in picks)
 
 
 @pytest.mark.parametrize("apart", [2, 3])

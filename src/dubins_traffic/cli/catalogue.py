@@ -185,7 +185,7 @@ def _line(configuration: Configuration) -> str:
     parts = (
         f"{own.number_trials} trials of {seconds} s",
         _roads(configuration),
-        f"{goals} goals" + _apart(own.goal_segments_apart),
+        f"{goals} goals" + _apart(own.goal_segments_apart) + _reach(own.goal_round_share),
         cars,
         judged,
     )
@@ -194,6 +194,10 @@ def _line(configuration: Configuration) -> str:
 
 def _apart(segments: int) -> str:
     return f" at least {segments} segments apart" if segments > 1 else ""
+
+
+def _reach(share: float | None) -> str:
+    return "" if share is None else f" within {share:g} of a trial"
 
 
 def _roads(configuration: Configuration) -> str:

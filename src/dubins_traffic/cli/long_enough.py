@@ -26,7 +26,10 @@ def least_duration(instance: Instance) -> float:
     """
     from dubins_traffic.routing.rounds import round_time  # compiles; only where it is asked for
 
-    once = round_time(instance.problem) if instance.problem.rules else math.inf
+    problem = instance.problem
+    if not problem.rules:
+        return 0.0
+    once = round_time(problem.network, problem.goal_vertices, problem.car.bounds.speed)
     return RECURRENT * once if math.isfinite(once) else 0.0
 
 

@@ -101,7 +101,7 @@ class Navigator:
         car = problem.car
         self._reach, self._middle, self._radius = car.body.reach, car.w, problem.intersection_radius
         self._roads = pack([problem.network], [2.0 * car.w])
-        goals, metres = stages(problem)
+        goals, metres = stages(problem.network, problem.goal_vertices)
         self._metres = metres
         self._goals: list[int] = goals.tolist()
         self._stage = NONE

@@ -47,7 +47,7 @@ class Rules:
         """Find the round through the goals; InputError if the car can't keep the rules."""
         check_fit(problem, owes=False)
         cars = 1 + len(problem.e_agents)
-        stage, distance = stages(problem)
+        stage, distance = stages(problem.network, problem.goal_vertices)
         self._state = State.zeros(1, cars)
         self._labels = Labels.zeros(1, cars)
         self._command = np.zeros((1, cars, 2))

@@ -130,8 +130,9 @@ class Group:
         breach_log = BreachLog.empty(trials, places, goals)
         most = MOST * places + int((terms["goals_end"] - terms["goals_begin"]).max())
         breach_log = breach_log.replace(row=table(FoundBreach, FRAMES * most))
-        find_all(problems if keeps_rules else ())
-        rounds = [stages(problem) for problem in problems] if keeps_rules else ()
+        sought = [(problem.network, problem.goal_vertices) for problem in problems if keeps_rules]
+        find_all(sought)
+        rounds = [stages(network, goals) for network, goals in sought]
         segments = int(np.diff(roads.seg_off).max())
         apart = spacing(trials, places, rows.far - cars.reach)
         labelling = labeller.seeing(self.state)
@@ -291,7 +292,8 @@ class Group:
             return []
         world, name = self._world, bare_name(controller)
         rows, endings = np.array(trials), [ending for b in trials if (ending := self.endings[b]) is not None]
-        find_all([own for b in trials if (own := self.instances[b].problem).rules])
+        judged = [own for b in trials if (own := self.instances[b].problem).rules]
+        find_all([(problem.network, problem.goal_vertices) for problem in judged])
         margins = self.margins(rows)
         found: list[Outcome] = []
         pending = pending_of(rows, world.terms, world.breach_log)

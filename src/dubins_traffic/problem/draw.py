@@ -6,10 +6,10 @@ common is worked out once, by its `Recipe`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from itertools import islice
+from itertools import islice, repeat
 
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.read_only import read_only
@@ -19,6 +19,7 @@ from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.problem import limits
 from dubins_traffic.problem.configuration import Configuration, PlannedAgent, check_goal, pose_of
 from dubins_traffic.problem.formulas import check_formulas
+from dubins_traffic.problem.goals import Reach, draw_goals
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.problem.kinds import KEEP_RULES, loops
 from dubins_traffic.problem.obstructions import check_obstructions
@@ -44,8 +45,6 @@ TOGETHER = 64
 """Number of instances that are drawn at a time."""
 BESIDE = 0.02
 """Gap that a car needs beside it to pass an obstacle within its lane, metres."""
-MOST_STEPS = 10_000
-"""Intersections that are tried as goals that are far apart, before they count as not found."""
 
 
 def draw(configuration: Configuration, seed: int = 0, trial: int = 0) -> Instance:
@@ -151,16 +150,20 @@ class Recipe:
         while k < len(trials):
             site = self._site_of(seed, trials[k])
             some = trials[k:] if site is self._site else trials[k : k + 1]
-            starts = place_cars(self._lots(site), site.wishes, seed, some, Stream.STARTS)
+            starts: Iterable[list[Pose] | None] = repeat(None, len(some))
+            if self._settings.goal_round_share is None:
+                starts = place_cars(self._lots(site), site.wishes, seed, some, Stream.STARTS)
             for trial, poses in zip(some, starts, strict=True):
                 yield self._instance(site, seed, trial, poses)
             k += len(some)
 
     def _instance(self, site: Site, seed: int, trial: int, starts: list[Pose] | None) -> Instance:
         settings = self._settings
+        duration = self._duration(seed, trial)
+        goals, lanes = self._goals(site.network, seed, trial, duration)
         problem = Problem(
             network=site.network,
-            goals=self._goals(site.network, seed, trial),
+            goals=goals,
             intersection_radius=self._radius,
             car=self._car,
             rate=settings.rate,
@@ -175,11 +178,14 @@ class Recipe:
         check_obstructions(problem)
         if starts is None:
             draws = Draws(seed, trial, Stream.STARTS)
-            starts = draw_starts(self._areas(site), self._car, site.wishes, draws)
+            wishes = (
+                site.wishes if lanes is None else [site.wishes[0]._replace(lanes=lanes), *site.wishes[1:]]
+            )
+            starts = draw_starts(self._areas(site), self._car, wishes, draws)
         return Instance(
             problem=problem,
             starts=tuple(starts),
-            duration=self._duration(seed, trial),
+            duration=duration,
             e_agents=site.agents,
             seed=seed,
             trial=trial,
@@ -226,13 +232,19 @@ class Recipe:
             site.lots = lots(self._car, (self._areas(site).outside,), site.wishes)
         return site.lots
 
-    def _goals(self, network: RoadNetwork, seed: int, trial: int) -> tuple[tuple[float, float], ...]:
+    def _goals(
+        self, network: RoadNetwork, seed: int, trial: int, duration: float
+    ) -> tuple[tuple[tuple[float, float], ...], Collection[int] | None]:
+        """Return the goals, and the lanes on which the ego is to start, None for any."""
         settings = self._settings
         if settings.goals is not None:
-            return tuple(check_goal(network, goal, k) for k, goal in enumerate(settings.goals))
+            return tuple(check_goal(network, goal, k) for k, goal in enumerate(settings.goals)), None
         low, high = settings.number_goals_bounds
         draws = Draws(seed, trial, Stream.GOALS)
-        return draw_goals(network, (low, high), draws, settings.goal_segments_apart)
+        share, speed = settings.goal_round_share, self._car.bounds.speed
+        reach = None if share is None else Reach(share, share * duration * speed)
+        picks, way = draw_goals(network, (low, high), draws, settings.goal_segments_apart, reach)
+        return tuple(network.intersections[v] for v in picks), None if way is None else set(way.lanes)
 
     def _duration(self, seed: int, trial: int) -> float:
         settings = self._settings
@@ -297,65 +309,6 @@ class Stream(IntEnum):
     DURATION = 3
     STARTS = 4
     CYCLES = 5
-
-
-def draw_goals(
-    network: RoadNetwork, bounds: tuple[int, int], draws: Draws, apart: int = 1
-) -> tuple[tuple[float, float], ...]:
-    """Return goals, their number drawn from `bounds` (both included); they differ as far as intersections suffice.
-
-    With `apart` of 2 or more every two goals are at least so many segments apart along the roads: each is drawn evenly
-    among the intersections that are far enough from those before it, and others are tried where that leads nowhere.
-
-    Raises
-    ------
-    InputError
-        If no such goals are found.
-    """
-    count = draws.between(*bounds)
-    places = len(network.intersections)
-    if apart > 1:
-        picks = _far_apart(network, count, apart, draws.shuffled(places))
-    else:
-        picks = draws.sample(min(count, places), places)
-        picks += [draws.below(places) for _ in range(count - places)]
-    return tuple(network.intersections[v] for v in picks)
-
-
-def _far_apart(network: RoadNetwork, count: int, apart: int, order: Sequence[int]) -> list[int]:
-    """Return `count` vertices, the first ones possible in `order`, every two of which are `apart` segments apart."""
-    places: list[int] = []
-    near = [0] * len(order)
-    place = steps = 0
-    while len(places) < count:
-        place = next((k for k in range(place, len(order)) if not near[order[k]]), len(order))
-        steps += 1
-        if steps > MOST_STEPS or (place == len(order) and not places):
-            raise InputError(
-                f"{count} goals so far apart are not found on a road network of {len(order)} intersections",
-                field="goal_segments_apart",
-                value=apart,
-                expected="a smaller number, or fewer goals (number_goals_bounds)",
-            )
-        change = -1 if place == len(order) else 1
-        chosen = places.pop() if change < 0 else place
-        for v in _within(network, order[chosen], apart - 1):
-            near[v] += change
-        if change > 0:
-            places.append(chosen)
-        place = chosen + 1
-    return [order[k] for k in places]
-
-
-def _within(network: RoadNetwork, start: int, most: int) -> set[int]:
-    """Return the vertices at most `most` segments from `start` along the roads, itself included."""
-    found = latest = {start}
-    for _ in range(most):
-        latest = {network.lane_ends(lane)[1] for v in latest for lane in network.arms(v)} - found
-        if not latest:
-            break
-        found = found | latest
-    return found
 
 
 def draw_duration(bounds: tuple[int, int], draws: Draws) -> float:

@@ -324,6 +324,10 @@ class Settings(World):
     goal_segments_apart: Annotated[int, Field(ge=1, le=limits.INTERSECTIONS)] = Field(
         default=1, description="how many segments drawn goals are apart at least, along the roads"
     )
+    goal_round_share: Annotated[float, Field(gt=0, le=1)] | None = Field(
+        default=None,
+        description="drawn goals: a free-flow round takes at most this share of the duration, and the ego starts on it",
+    )
     ego: EgoModel = Field(default=EgoModel(), description="the ego")
 
     @model_validator(mode="after")

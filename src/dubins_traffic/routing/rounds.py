@@ -11,39 +11,38 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.routing.tours import LaneGraph, find_round, find_rounds, free_round, lane_graph
 
 if TYPE_CHECKING:
-    from collections.abc import Iterable
+    from collections.abc import Iterable, Sequence
 
-    from dubins_traffic.problem.instance import Problem
+    from dubins_traffic.roads.network import RoadNetwork
 
 
-def find_all(problems: Iterable[Problem]) -> None:
-    """Find the rounds of many problems, in less time than `round_time` and `stages` take one after another."""
-    graphs: dict[int, tuple[LaneGraph, list[tuple[int, ...]]]] = {}
-    for problem in problems:
-        network = problem.network
+def find_all(wanted: Iterable[tuple[RoadNetwork, Sequence[int]]]) -> None:
+    """Find many rounds, in less time than `round_time` and `stages` take one after another."""
+    graphs: dict[int, tuple[LaneGraph, list[Sequence[int]]]] = {}
+    for network, goals in wanted:
         _, lists = graphs.setdefault(id(network), (lane_graph(network), []))
-        lists.append(problem.goal_vertices)
+        lists.append(goals)
     for graph, lists in graphs.values():
         find_rounds(graph, lists)
 
 
-def round_time(problem: Problem) -> float:
-    """Return the seconds of a round through all goals in free flow: at top speed on empty roads; inf if there is none.
+def round_time(network: RoadNetwork, goals: Sequence[int], speed: float) -> float:
+    """Return the seconds of a round through all goals in free flow: at `speed` (m/s) on empty roads; inf: none exists.
 
     The round is the shortest closed route through all goals, which turns round at dead ends only; that of a single goal
     goes to the nearest other intersection and back, since that makes a visit. Turning costs nothing.
     """
-    found = free_round(lane_graph(problem.network), problem.goal_vertices)
-    return inf if found is None else found.length / problem.car.bounds.speed
+    found = free_round(lane_graph(network), goals)
+    return inf if found is None else found.length / speed
 
 
-def stages(problem: Problem) -> tuple[Ints, Floats]:
+def stages(network: RoadNetwork, goals: Sequence[int]) -> tuple[Ints, Floats]:
     """Return the goals in the order of the round (M,), and the metres from the start of each lane to each (M, L).
 
     M is 0 without goals that can be reached.
     """
-    graph = lane_graph(problem.network)
-    found = find_round(graph, problem.goal_vertices)
+    graph = lane_graph(network)
+    found = find_round(graph, goals)
     if found is None:
         return np.zeros(0, dtype=np.int64), np.zeros((0, 0))
     kept = graph.stages.get(found)

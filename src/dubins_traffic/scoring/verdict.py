@@ -397,4 +397,4 @@ def rounds_limit(problem: Problem, rules: RuleParameters) -> float:
     """Return the part of `gap_limit` that does not depend on the duration, seconds; inf if there is no round."""
     from dubins_traffic.routing.rounds import round_time  # compiles; only where there is something to judge
 
-    return rules.gap_rounds * round_time(problem)
+    return rules.gap_rounds * round_time(problem.network, problem.goal_vertices, problem.car.bounds.speed)

@@ -183,7 +183,7 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
     """
     trials = len(problems)
     rows = table(Driver, (trials, cars))
-    rounds = [stages(problem) for problem in problems]
+    rounds = [stages(problem.network, problem.goal_vertices) for problem in problems]
     lanes = max((far.shape[1] for _, far in rounds), default=0)
     stage: list[int] = []
     distance = np.full((sum(len(own) for own, _ in rounds), lanes), np.inf)
