@@ -9,7 +9,9 @@ import pytest
 from experiments import towns
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.files import read_text
 from dubins_traffic.maps.opendrive import OpenDrive
+from dubins_traffic.maps.settings import ImportSettings
 from dubins_traffic.maps.sumo import SumoNet
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
@@ -85,6 +87,32 @@ def test_rules_makes_counted_rounds_where_goals_are_within_reach(town: str) -> N
     one = towns.drive(0, town, drawn=towns.within_reach)
     assert one.clean
     assert one.counted >= 2
+
+
+@pytest.mark.parametrize(("town", "most"), [("A10KW", 1_000.0), ("DRT", 2_000.0)])
+def test_pairs_of_one_way_roads_are_held_as_one(town: str, most: float) -> None:
+    """Metres dropped as one-way were 11,505 and 8,681 in these; `rules` drives on what is held."""
+    found = folder() / "game" / towns.MAPS[town]
+    text = read_text(str(found))
+    before = SumoNet().reduced(text).losses
+    document, losses = SumoNet().reduced(text, None, ImportSettings(pairs=25.0))
+    dropped = [
+        sum(metres for fate, why, _, metres in own.rows() if (fate, why) == ("dropped", "one-way"))
+        for own in (before, losses)
+    ]
+    assert dropped[0] > 8_000.0
+    assert dropped[1] < most
+    network = RoadNetwork.from_document(document)
+    assert clearance_faults(network, 1.0, 0.177, 0.3) == []
+    assert lacking(network) == []
+    config = a_minute("town").to_document() | {
+        "network": None,
+        "rnd": dict(document),
+        "goal_round_share": 0.5,
+    }
+    config |= {"duration": 300, "number_goals_bounds": [1, 4]}
+    score = run_trial(draw(load_config(config), seed=0, trial=0), "rules").score
+    assert score.counted_rounds >= 1
 
 
 def test_the_same_town_by_way_of_opendrive(tmp_path: Path) -> None:

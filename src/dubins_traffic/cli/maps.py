@@ -30,11 +30,17 @@ LossesOption = Annotated[
 
 
 def imported(
-    file: str, scale: float | None, w: float | None, tolerance: float, part: Part | None = None
+    file: str,
+    scale: float | None,
+    w: float | None,
+    tolerance: float,
+    part: Part | None = None,
+    pairs: float | None = None,
 ) -> RoadNetwork:
     """Return the network that a file holds, of whatever format; InputError if it holds none, or nothing can be held.
 
     Where a scale is given and `w` is not, that is half a lane of the map at the scale. A `part` of it must have a loop.
+    One-way roads at most `pairs` metres apart become one road.
     """
     from dubins_traffic.files import read_text
     from dubins_traffic.maps.foreign import ForeignFormat
@@ -46,9 +52,11 @@ def imported(
     text = read_text(file)
     form = formats.of_text(text)
     if not isinstance(form, ForeignFormat):
-        require_no_scale(file, scale, w, part)
+        require_no_scale(file, scale, w, part, pairs)
         return RoadNetwork.from_text(text, file, form)
-    settings = ImportSettings(w=W if w is None else w, scale=scale, tolerance=tolerance)
+    settings = ImportSettings(
+        w=W if w is None else w, scale=scale, tolerance=tolerance, pairs=0.0 if pairs is None else pairs
+    )
     own = scale is not None and w is None
     document, losses = form.reduced(text, file, settings, own_lanes=own, part=part)
     network = RoadNetwork.from_document(document, file)
@@ -70,10 +78,15 @@ def part_asked(clip: str | None, around: tuple[str, float] | None) -> Part | Non
 
 
 def require_no_scale(
-    source: str | None, scale: float | None, w: float | None, part: Part | None = None
+    source: str | None,
+    scale: float | None,
+    w: float | None,
+    part: Part | None = None,
+    pairs: float | None = None,
 ) -> None:
-    """Refuse a scale, a `w` and a part where the network in `source` comes from no map of another program."""
-    for name, given in (("--scale", scale), ("--w", w), (str(part).partition(" ")[0], part)):
+    """Refuse what only a map of another program allows where the network in `source` comes from none."""
+    own = str(part).partition(" ")[0]
+    for name, given in (("--scale", scale), ("--w", w), (own, part), ("--pairs", pairs)):
         if given is not None:
             raise InputError(
                 "nothing to reduce", file=name, value=source, expected="--from a map of another program"

@@ -81,6 +81,14 @@ ToleranceOption = Annotated[
     typer.Option("--tolerance", metavar="D", help="How far a road may be from the map's, metres of the map."),
 ]
 
+PairsOption = Annotated[
+    float | None,
+    typer.Option(
+        "--pairs",
+        metavar="D",
+        help="Of a map, make one road of two one-way roads, at most D metres apart, one for each direction.",
+    ),
+]
 ClipOption = Annotated[
     str | None,
     typer.Option(
@@ -110,6 +118,7 @@ def network(
     tolerance: ToleranceOption = 0.1,
     clip: ClipOption = None,
     around: AroundOption = None,
+    pairs: PairsOption = None,
     losses: maps.LossesOption = None,
     seed: options.Seed = 0,
     format: Annotated[Format, typer.Option("--format", help="Container of the network.")] = Format.JSON,
@@ -127,14 +136,14 @@ def network(
     )
     part = maps.part_asked(clip, around)
     if source is None:
-        maps.require_no_scale(None, scale, w, part)
+        maps.require_no_scale(None, scale, w, part, pairs)
     if source is not None:
         if (intersections, segments, grid) != (None, None, None):
             raise InputError(
                 "two networks at once", file="--from", value=source, expected="nothing else beside it"
             )
         with maps.telling(losses, source, output, overwrite=overwrite):
-            made = maps.imported(source, scale, w, tolerance, part)
+            made = maps.imported(source, scale, w, tolerance, part, pairs)
     elif intersections is None and segments is None:
         rows, columns = grid or (3, 4)
         made = RoadNetwork.grid(rows, columns)

@@ -123,7 +123,7 @@ def paired(directions: list[OneWay]) -> list[Road]:
     roads: list[Road] = []
     for one in directions:
         back = waiting.get((one.last, one.first), [])
-        gaps = [_gap(one.line, other.line[::-1]) for other in back]
+        gaps = [gap(one.line, other.line[::-1]) for other in back]
         if gaps and min(gaps) <= APART:
             roads.append(_joined(back.pop(gaps.index(min(gaps))), one))
         else:
@@ -141,12 +141,12 @@ def _joined(one: OneWay, back: OneWay) -> Road:
     return Road(one.name, one.first, one.last, one.line, one.lanes, back.lanes, width, one.corners, closed)
 
 
-def _gap(one: Floats, other: Floats) -> float:
+def gap(one: Floats, other: Floats) -> float:
     """Return the largest distance of two lines at equal shares of their lengths."""
-    step = _spread(one) - _spread(other)
+    step = spread(one) - spread(other)
     return float(np.sqrt((step * step).sum(axis=1)).max())
 
 
-def _spread(line: Floats) -> Floats:
+def spread(line: Floats) -> Floats:
     """Return points at equal shares of a line's length."""
     return at(line, np.linspace(0.0, float(along(line)[-1]), _SAMPLES))

@@ -23,6 +23,7 @@ class Reason(StrEnum):
 
     CLOSED = "not for cars"
     ONE_WAY = "one-way"
+    PAIR = "two one-way roads beside each other"
     LANES = "more lanes than one in a direction"
     WIDTH = "lanes of another width"
     DEGREE = "more than four roads at a junction"

@@ -56,6 +56,8 @@ class Road:
         The control polygon between both ends, where the file gives the road exactly as lines and tangent arcs.
     closed : bool
         Whether it is not for cars, but for other traffic of the road, such as buses; lanes are those of this.
+    pair : bool
+        Whether it stands for two one-way roads beside each other (`maps.pairs`).
     """
 
     name: str
@@ -67,6 +69,7 @@ class Road:
     lane_width: float
     corners: tuple[Corner, ...] | None = None
     closed: bool = False
+    pair: bool = False
 
     @property
     def length(self) -> float:

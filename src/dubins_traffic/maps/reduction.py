@@ -15,6 +15,7 @@ from dubins_traffic.maps.fitting import line_of
 from dubins_traffic.maps.from_rnd import network_document
 from dubins_traffic.maps.losses import Losses, NothingHeldError, Outcome, Reason, losses
 from dubins_traffic.maps.model import Road, RoadMap
+from dubins_traffic.maps.pairs import merged
 from dubins_traffic.maps.settings import ImportSettings
 
 MOST_WORK = 300
@@ -72,6 +73,8 @@ def reduction(
         outcomes = [Outcome(road, (road.line,), ()) for road in road_map.roads]
         return Reduction(document, losses(outcomes, settings.tolerance, 1.0, len(outcomes), settings.w))
     _check_length(road_map.roads, file)
+    if settings.pairs:
+        road_map = merged(road_map, settings.pairs)
     width = usual_width(road_map.roads)
     if own_lanes:
         settings = settings.with_lanes(width)
@@ -162,6 +165,8 @@ def _reasons(
         found.append(Reason.ONE_WAY)
     if max(road.forward, road.backward) > 1:
         found.append(Reason.LANES)
+    if road.pair and held:
+        found.append(Reason.PAIR)
     if held:
         return (*found, Reason.WIDTH) if abs(road.lane_width - width) > WIDTH_PLAY * width else tuple(found)
     if number in dropped:

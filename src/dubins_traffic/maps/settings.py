@@ -51,6 +51,9 @@ class ImportSettings:
         Metres of the network in one metre of the map; by default the usual lane of the map becomes 2w wide.
     tolerance : float
         How far a road may be from that of the map where it counts as kept, metres of the map.
+    pairs : float
+        One-way roads beside each other, one for each direction, that are at most so many metres of the map apart, 1 to
+        200, become one road (`maps.pairs`); 0: none do.
     """
 
     w: float = W
@@ -59,6 +62,7 @@ class ImportSettings:
     slack: float = SEGMENT_SLACK
     scale: float | None = None
     tolerance: float = 0.1
+    pairs: float = 0.0
 
     def __post_init__(self) -> None:
         for name, low, high in (
@@ -68,6 +72,8 @@ class ImportSettings:
             ("tolerance", 1e-6, 1e3),
         ):
             self._check(name, getattr(self, name), low, high)
+        if self.pairs != 0.0:
+            self._check("pairs", self.pairs, 1.0, 200.0)
         if self.scale is not None:
             self._check("scale", self.scale, 1e-6, 1e6)
         self._check("radius", self.disc, LEAST_RADIUS * self.w - 1e-9, 1e4)
