@@ -22,7 +22,7 @@ FRONT = "<!-- results -->"
 CONTROLLERS = ("lanes", "lanes+shield", "rules", "rules+shield", "simple", "simple+shield")
 """Who drives where a suite does not say: the built-in ones, with and without the shield."""
 ASKED = {"adversary-2026": [word for name in CONTROLLERS for word in ("--controller", name)]}
-SUITES = ("icra2016", "rules-2026", "adversary-2026", "synthesis-2026")
+SUITES = ("icra2016", "rules-2026", "towns-2026", "adversary-2026", "synthesis-2026")
 HEAD = """# Results
 
 This page shows how every built-in controller does, with and without the [shield](shield.md), on every shipped

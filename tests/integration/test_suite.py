@@ -93,7 +93,9 @@ def test_the_results_that_the_site_shows_are_these(rules: list[Path]) -> None:
     assert own["columns"] == first(kept, TRIALS, 2)
 
 
-@pytest.mark.parametrize("name", ["icra2016", *(("adversary-2026", "synthesis-2026") if TRIALS == 2 else ())])
+@pytest.mark.parametrize(
+    "name", ["icra2016", *(("towns-2026", "adversary-2026", "synthesis-2026") if TRIALS == 2 else ())]
+)
 def test_every_controller_comes_to_the_results_that_the_site_shows(name: str, tmp_path: Path) -> None:
     """A trial of each combination; `make test-all` runs all of every suite."""
     suite, kept = load_suite(name), shown(name)
