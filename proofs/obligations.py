@@ -10,9 +10,10 @@ from types import ModuleType
 from typing import Final
 
 from dubins_traffic.policies import safety
-from dubins_traffic.rules import queue
+from dubins_traffic.policies.rules import steering
+from dubins_traffic.rules import breaches, queue, referee_kernel
 from dubins_traffic.shield import checks, nearest_command
-from proofs import arrival, contact, quiet
+from proofs import arrival, contact, keeping, quiet
 from proofs.claims import Obligation
 from proofs.terms import replaced
 
@@ -20,6 +21,7 @@ SHIELD: Final = "design/014-shield.md#on-straight-roads"
 ANY: Final = (
     "every body, segment (straight or bent), disc and rate; roads 0.2 m wide and `turn_back` 2 cm at least"
 )
+KEEPING: Final = "theory.md#kept-in-a-tick"
 ANY_RATE: Final = "every rate and every bound of speed and yaw rate"
 
 OBLIGATIONS: Final = {
@@ -83,6 +85,22 @@ OBLIGATIONS: Final = {
             "theory.md#fixed-routes-a-bound-without-a-search", ("rules.queue.keep_order", "rules.queue.rank_queue"),
             "two to four arms, any number of tickets", arrival.order_of_arrival,
         ),
+        Obligation(
+            "standing", "Who stands in a quiet frame breaks none of 1.road and rules 2 and 3, and the next frame is "
+            "quiet: so E1 can be kept.", KEEPING,
+            ("rules.location.locate", "rules.frame._label_blocked", "rules.referee_kernel._judge_car"), ANY,
+            quiet.keeps_while_standing,
+        ),
+        Obligation(
+            "driven", "With others close, the law gives a command that it has found safe, or stands, or slides past "
+            "who is at its side (E2).", KEEPING,
+            ("policies.rules.steering.move", "policies.rules.steering.come_back", "policies.rules.steering.goes_on"),
+            "discs and rectangles, every way, every offset and every speed", keeping.drives_clear_or_stands,
+        ),
+        Obligation(
+            "called", "Who must enter a crossing (E3) breaks none of 3.stop, 3.order and 3.clear by entering.", KEEPING,
+            ("rules.breaches.judge_queue", "rules.breaches.judge_entry"), "any labels", keeping.may_enter_when_it_must,
+        ),
     )
 }  # fmt: skip
 """By name, in the order in which they are proved."""
@@ -121,6 +139,10 @@ FLAWS: Final = (
     Flaw("order", queue, "car.ticket <= earliest + group_ticks", "car.ticket >= earliest + group_ticks"),
     Flaw("order", queue, "        first.ticket = tick\n", ""),
     Flaw("order", queue, "        waiting -= 1\n", ""),
+    Flaw("standing", referee_kernel, "far = roads.half_width[net] + GRAIN", "far = roads.half_width[net] - GRAIN"),
+    Flaw("driven", steering, "    if not safe:\n        speed = 0", "    if not safe and near > 1:\n        speed = 0"),
+    Flaw("driven", steering, "return on and (not outside", "return (not outside"),
+    Flaw("called", breaches, "FIRST_AND_CLEAR == FIRST_AND_CLEAR", "FIRST_AND_CLEAR != 0"),
 )  # fmt: skip
 
 

@@ -328,11 +328,12 @@ NO_ENTRY: Final = {"_entry_flags": lambda *_: Flags(bits=[False] * BITS)}
 """What the labeller finds that a clause does not depend on: left out, the code has fewer paths."""
 
 
-def keeps(refused: dict[str, Any], located: dict[str, Any], *, lane: bool) -> int:
+def keeps(refused: dict[str, Any], located: dict[str, Any], *, lane: bool, stands: bool = False) -> int:
     """Prove that a command that `refusal` lets through breaks no rule that is judged from what is not left out.
 
     `refused` and `located` are left out of the shield's look and of the labeller's; `lane` tells whether the car must
-    not be left in the next frame either. Returns the number of paths on which the command is let through.
+    not be left in the next frame either. With `stands` the car stands instead, and nobody looks. Returns the number of
+    paths on which the command is let through.
     """
     through = Explorer(*World().premises, squared=World().squared)
     worlds: list[World] = []
@@ -341,7 +342,9 @@ def keeps(refused: dict[str, Any], located: dict[str, Any], *, lane: bool) -> in
         world = World(crossings=not lane)
         worlds.append(world)
         with instead(world, refused, located):
-            reason = checks.refusal(0, Real("speed"), Real("yaw_rate"), 0, world.traffic, world.shields)
+            reason: int = REASON.NOTHING
+            if not stands:
+                reason = checks.refusal(0, Real("speed"), Real("yaw_rate"), 0, world.traffic, world.shields)
             if reason == REASON.NOTHING:
                 tables = world.tables
                 location.locate(0, EGO, world.tick, tables)
@@ -380,6 +383,12 @@ def keeps_its_lane() -> int:
 def enters_on_its_turn() -> int:
     """Prove it of 3.stop, 3.order and 3.clear."""
     return keeps({"_leaves_lane": _passes}, NO_LANE | NO_REACH, lane=False)
+
+
+def keeps_while_standing() -> int:
+    """Prove of a car that stands that it breaks none of 1.road and rules 2 and 3, and that the next frame is quiet."""
+    in_its_lane = keeps({}, NO_ENTRY, lane=True, stands=True)
+    return in_its_lane + keeps({}, NO_LANE | NO_REACH, lane=False, stands=True)
 
 
 def top_is_kept() -> int:
