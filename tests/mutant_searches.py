@@ -34,13 +34,15 @@ class _FoundError(Exception):
     """A search has found what it was to find."""
 
 
-def first(name: str, strategy: str, seed: int, trials: int) -> int | None:
+def first(name: str, strategy: str, seed: int, trials: int, world: dict[str, Any] = TOWN) -> int | None:
     """Return after how many trials a search found its first breach of a mutant, None if it found none in `trials`."""
-    found = first_found(name, strategy, seed, trials)
+    found = first_found(name, strategy, seed, trials, world)
     return None if found is None else found[0]
 
 
-def first_found(name: str, strategy: str, seed: int, trials: int) -> tuple[int, list[Case]] | None:
+def first_found(
+    name: str, strategy: str, seed: int, trials: int, world: dict[str, Any] = TOWN
+) -> tuple[int, list[Case]] | None:
     """Return after how many trials a search found its first breach of a mutant, and the cases of that generation."""
     found: list[Search] = []
     least, most = (LARGE, LARGE) if strategy == "uniform" else (SMALL, GENERATION)
@@ -53,7 +55,7 @@ def first_found(name: str, strategy: str, seed: int, trials: int) -> tuple[int, 
     with tempfile.TemporaryDirectory() as folder, patch.object(search, "SMALL", least):
         try:
             falsify(
-                Configuration.from_document(TOWN),
+                Configuration.from_document(world),
                 MUTANTS[name].kind,
                 Path(folder) / "found",
                 trials=trials,

@@ -16,6 +16,7 @@ from dubins_traffic.falsification.plugged import Plugged
 from dubins_traffic.falsification.sampling import Source, Stream
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.outside import is_place
+from dubins_traffic.rules.parameters import RuleParameters
 
 if TYPE_CHECKING:
     import numpy as np
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 FRESH: Final = 0.4
 """Share of proposals that are drawn at random."""
+CROWDED: Final = 0.7
+"""The same of a search for many things where there are no more crossings than cars. Everybody meets everybody there, so
+a trial drawn anew comes as near to a breach as a child of another, and shows more that is new."""
 ARRANGED: Final = 0.7
 """In so many of these some cars are brought to the ego (`sampling.Source.arranged`)."""
 LINES: Final = {"one": 4, "many": 16}
@@ -76,6 +80,7 @@ class Evolution:
         self._worst: dict[str, int] = {}
         """The line of a target with the largest margin, where it is known."""
         self._idle = dict.fromkeys(targets, 0)
+        self._fresh = CROWDED if len(targets) > 1 and _is_crowded(source) else FRESH
         self._often: dict[int, int] = {}
         self._rare: dict[int, Genome] = {}
         self._parents: dict[int, tuple[str, int]] = {}
@@ -89,7 +94,7 @@ class Evolution:
         parents: dict[int, Genome] = {}
         for number in numbers:
             dice = self._source.dice(number, Stream.PARENTS)
-            if dice.random() >= FRESH:
+            if dice.random() >= self._fresh:
                 parent = self._parent(number, dice)
                 if parent is not None:
                     parents[number] = parent
@@ -213,6 +218,13 @@ class Evolution:
         self._idle = dict(state["idle"])
         self._often = dict(state["often"])
         self._rare = {situation: Genome.from_json(genome) for situation, genome in state["rare"]}
+
+
+def _is_crowded(source: Source) -> bool:
+    """Tell whether a search is on a network with no more crossings than cars."""
+    instance = source.draw([0])[0]
+    least = RuleParameters.from_mapping(instance.problem.rules).crossing_degree
+    return int((instance.problem.network.degrees >= least).sum()) <= len(instance.starts)
 
 
 STEP: Final = 0.3
