@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from math import hypot
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,7 +18,9 @@ from dubins_traffic.problem.goals import Reach, draw_goals
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.routing.rounds import round_time
+from dubins_traffic.runs.single import run_trial
 
+MAPS = Path(__file__).parents[2] / "examples" / "maps"
 ROAD = RoadNetwork.grid(1, 4)
 """Three segments of 3 m in a row, with two dead ends: a car turns round at these alone."""
 
@@ -127,3 +130,17 @@ def test_a_large_network_takes_no_longer_than_its_steps() -> None:
 def test_other_values_are_refused(value: object) -> None:
     with pytest.raises(InputError, match="goal_round_share"):
         load_config({**document(), "goal_round_share": value})
+
+
+@pytest.mark.parametrize("file", sorted(path.name for path in MAPS.iterdir() if path.suffix != ".md"))
+def test_rules_makes_counted_rounds_on_every_map_that_is_shipped(file: str) -> None:
+    own = load_config(
+        document(
+            network=None,
+            rnd=str(MAPS / file),
+            duration=300,
+            **{"e-agents": [{"type": "lawful", "name": "car"}]},
+        )
+    )
+    for trial in range(3):
+        assert run_trial(draw(own, 1, trial), "rules").score.counted_rounds >= 1
