@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -115,6 +116,15 @@ def test_a_network_holds_them_and_tells_of_it() -> None:
     without = reduction(street()).losses
     assert without.plain_length == pytest.approx(600.0)
     assert not [row for row in without.rows() if "beside" in row[1]]
+
+
+def test_doubled_points_and_loops_do_no_harm() -> None:
+    whole = street()
+    rounds = np.array([[0.0, 7.0], [-20.0, 7.0], [-20.0, 20.0], [0.0, 20.0], [0.0, 7.0]])
+    doubled = [replace(own, line=np.repeat(own.line, 2, axis=0)) for own in whole.roads]
+    loop = Road("round", "f", "f", rounds, 1, 0, 3.2)
+    found = merged(RoadMap(whole.junctions, [*doubled, loop]), 20.0)
+    assert kinds(found) == {"pair": 3, "both": 2, "one-way": 2}
 
 
 def test_a_map_without_one_way_roads_is_left_alone() -> None:

@@ -18,10 +18,12 @@ import numpy as np
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.maps.junctions import Union, gap, spread
 from dubins_traffic.maps.model import Junction, Road, RoadMap
-from dubins_traffic.maps.polylines import along, at, stretch
+from dubins_traffic.maps.polylines import along, at, cleaned, stretch
 
 FACING = -0.8
 """Roads face each other where the cosine between their directions is at most this."""
+SHORT = 1e-150
+"""A side is at least this long, metres, so that its square is not 0 where a point of a map is doubled."""
 SNAP = 0.5
 """A road is not cut nearer than so many times the distance asked for to one of its ends: the end is taken."""
 INSIDE = 3.0
@@ -68,10 +70,10 @@ def merged(found: RoadMap, within: float) -> RoadMap:
 
 
 def _forward(road: Road) -> Road:
-    """Return a one-way road with its line in the direction of its lanes."""
+    """Return a one-way road with its line in the direction of its lanes, and no point of it doubled."""
+    line = cleaned(road.line if road.forward else road.line[::-1])
     if road.forward:
-        return road
-    line = road.line[::-1].copy()
+        return replace(road, line=line)
     return replace(
         road, first=road.last, last=road.first, line=line, forward=road.backward, backward=0, corners=None
     )
@@ -94,7 +96,7 @@ class _Sides:
         self._owner: Ints = np.concatenate([np.full(len(line) - 1, k) for k, line in lines.items()])
         self._begin: Floats = np.concatenate([line[:-1] for line in lines.values()])
         self._step: Floats = np.concatenate([np.diff(line, axis=0) for line in lines.values()])
-        self._length: Floats = np.maximum(np.hypot(self._step[:, 0], self._step[:, 1]), 1e-300)
+        self._length: Floats = np.maximum(np.hypot(self._step[:, 0], self._step[:, 1]), SHORT)
         self._before: Floats = np.concatenate([along(line)[:-1] for line in lines.values()])
         self._cells: dict[tuple[int, int], set[int]] = {}
         for side, (begin, step, length) in enumerate(zip(self._begin, self._step, self._length, strict=True)):
