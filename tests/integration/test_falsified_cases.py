@@ -39,6 +39,14 @@ def test_rules_gets_past_who_stands_askew_beside_it() -> None:
     ] == []
 
 
+def test_rules_is_kept_waiting_as_the_page_of_theory_says() -> None:
+    """It leans past who stands in a bend, gets no farther at the inner corner of the road, and stays there.
+
+    Who mends that moves the case to the others, and counts the searches of theory.md anew.
+    """
+    assert [own.file.name for own in outcomes(cases_in(CONTRACT / "open"), "rules") if own.passed] == []
+
+
 def test_who_keeps_the_law_is_not_brought_to_a_breach_by_an_ego_that_stands() -> None:
     """It waited so far before a full crossing that E5 asked it to come on (`crossing_degree` 1).
 
