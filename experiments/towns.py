@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import cache, partial
@@ -82,13 +82,18 @@ def games() -> Path | None:
     return next((found for at in ENVIRONMENTS for found in at.glob(GAMES)), None)
 
 
-@cache
-def reduced(town: str) -> Reduction:
-    """Return the network to which a town is reduced, and what is lost."""
+def text_of(town: str) -> str:
+    """Return SUMO's own file of a map."""
     folder = games()
     if folder is None:
         raise SystemExit("experiments: SUMO is not installed; scripts/peers.sh sumo says why")
-    return SumoNet().reduced(read_text(str(folder / MAPS[town])))
+    return read_text(str(folder / MAPS[town]))
+
+
+@cache
+def reduced(town: str) -> Reduction:
+    """Return the network to which a town is reduced, and what is lost."""
+    return SumoNet().reduced(text_of(town))
 
 
 def roads(town: str) -> dict[str, Any]:
@@ -184,40 +189,36 @@ def reached(found: Sequence[Drive]) -> list[Row]:
     return rows
 
 
-def trials(count: int = TRIALS, jobs: int = 2, first: int = 0, seconds: float = DURATION) -> list[Drive]:
-    """Run `count` trials in each town, in `jobs` processes, and print those that are not clean."""
+def trials(
+    towns: Iterable[str], numbers: Iterable[int], jobs: int, drawn: Callable[..., Instance] = instance
+) -> list[Drive]:
+    """Run the trials of some numbers on each map, in `jobs` processes, and print those that are not clean."""
     found: list[Drive] = []
     with ProcessPoolExecutor(jobs) as pool:
-        for town in TOWNS:
-            for one in pool.map(partial(drive, town=town, seconds=seconds), range(first, first + count)):
+        for town in towns:
+            for one in pool.map(partial(drive, town=town, drawn=drawn), numbers):
                 found.append(one)
                 if not one.clean:
                     print(one, flush=True)
     return found
 
 
-def reaches(jobs: int = 2, seconds: float = DURATION) -> list[Drive]:
-    """Run the trials on the ten maps, in `jobs` processes."""
-    with ProcessPoolExecutor(jobs) as pool:
-        return [
-            one
-            for town in MAPS
-            for one in pool.map(
-                partial(drive, town=town, seconds=seconds, drawn=within_reach), range(ON_EACH)
-            )
-        ]
+def table(count: int = TRIALS, jobs: int = 2, first: int = 0) -> list[Row]:
+    """Run `count` trials in each town, and those on the ten maps; return the table of the bars."""
+    anywhere = trials(TOWNS, range(first, first + count), jobs)
+    return bars(anywhere) + reached(trials(MAPS, range(ON_EACH), jobs, within_reach))
 
 
 def measure() -> list[Row]:
     """Run all trials and return the table of the bars."""
     if games() is None:
         subprocess.run([str(ROOT / "scripts" / "peers.sh"), "sumo"], check=True)
-    return bars(trials()) + reached(reaches())
+    return table()
 
 
 def main() -> None:
     """Print what is remarkable, and the table."""
-    show("towns", bars(trials(*(int(argument) for argument in sys.argv[1:4]))) + reached(reaches()))
+    show("towns", table(*(int(argument) for argument in sys.argv[1:4])))
 
 
 if __name__ == "__main__":

@@ -17,7 +17,7 @@ from dubins_traffic.rules import breaches
 from dubins_traffic.rules.breach_log import RULES
 from dubins_traffic.rules.propositions import FLAG
 from proofs.claims import RefutedError
-from proofs.quiet import PLAIN
+from proofs.quiet import PLAIN, Of
 from proofs.terms import Explorer, Flags, Real, Truth, Whole, replaced, truth_of, z3
 
 if TYPE_CHECKING:
@@ -27,15 +27,9 @@ AGENT = 1
 """The e-agent that is looked at."""
 
 
-class _Anything(dict[Any, Any]):
-    """A table in which every row is the same."""
-
-    def __init__(self, value: Any) -> None:
-        super().__init__()
-        self._value = value
-
-    def __missing__(self, _key: object) -> Any:
-        return self._value
+def _same(value: Any) -> Of:
+    """Return a table in which every row is the same."""
+    return Of(lambda _index: value)
 
 
 class Drive:
@@ -52,11 +46,11 @@ class Drive:
         )  # fmt: skip
         self.disc = disc
         self.premises = [vehicle.tightest.term >= 0, *([] if disc else [vehicle.half_length.term > 0])]
-        pose = {name: _Anything(Real(name)) for name in "xycs"}
+        pose = {name: _same(Real(name)) for name in "xycs"}
         car = SimpleNamespace(aside=Real("aside"))
         self.traffic = SimpleNamespace(
-            state=SimpleNamespace(**pose), labels=SimpleNamespace(bits=_Anything(Flags("bits"))),
-            drivers=SimpleNamespace(vehicle=[vehicle], car=_Anything(car)), scratch=SimpleNamespace(near=[EGO]),
+            state=SimpleNamespace(**pose), labels=SimpleNamespace(bits=_same(Flags("bits"))),
+            drivers=SimpleNamespace(vehicle=[vehicle], car=_same(car)), scratch=SimpleNamespace(near=[EGO]),
         )  # fmt: skip
 
     def is_safe(self, _b: int, _n: int, speed: Any, yaw_rate: Any, *_: Any) -> Truth:
@@ -77,15 +71,8 @@ class Drive:
         names = ("allowed", "left", "offset", "px", "py", "bend")
         with replaced(steering, self._instead()):
             found: tuple[Any, Any] = steering.move(
-                0,
-                AGENT,
-                *(Real(name) for name in names),
-                _either(),
-                SimpleNamespace(),
-                near,
-                -1,
-                self.traffic,
-            )
+                0, AGENT, *(Real(name) for name in names), _either(), SimpleNamespace(), near, -1, self.traffic
+            )  # fmt: skip
         return found
 
     def _instead(self) -> dict[str, Any]:
@@ -175,7 +162,7 @@ def may_enter_when_it_must() -> int:
         tables = SimpleNamespace(
             log=log, terms=[SimpleNamespace(enter_ticks=300, most_tickets=1)],
             memory=SimpleNamespace(car={(0, AGENT): kept}), spacing=SimpleNamespace(near=[EGO, AGENT]),
-            labels=SimpleNamespace(lane=_Anything(lane), bits=_Anything(bits)),
+            labels=SimpleNamespace(lane=_same(lane), bits=_same(bits)),
         )  # fmt: skip
         tick = 7
         with replaced(breaches, {"add": lambda _log, _car, rule, *_: broken.append(rule)}):

@@ -65,7 +65,7 @@ DEGREE, END, LENGTH = (
 ITS_CROSSES = z3.Int("its_crosses")
 
 
-class _Of:
+class Of:
     """A table whose rows are made of their index."""
 
     def __init__(self, row: Callable[[Any], Any]) -> None:
@@ -107,9 +107,9 @@ class World:
         )  # fmt: skip
         self.roads = SimpleNamespace(
             half_width=[Real("half_road")], vert_off=[0], seg_off=[0],
-            degree=_Of(lambda v: Whole(DEGREE(whole_of(v))) if crossings else -1),
-            vertex=_Of(lambda v: SimpleNamespace(x=v, y=v)),
-            segment=_Of(lambda k: SimpleNamespace(length=Real(LENGTH(whole_of(k))), piece=-1)),
+            degree=Of(lambda v: Whole(DEGREE(whole_of(v))) if crossings else -1),
+            vertex=Of(lambda v: SimpleNamespace(x=v, y=v)),
+            segment=Of(lambda k: SimpleNamespace(length=Real(LENGTH(whole_of(k))), piece=-1)),
         )  # fmt: skip
         self.bits = Flags("bits")
         self.lane, self.at, self.crosses, self.tick = (Whole(n) for n in ("lane", "at", "crosses", "tick"))

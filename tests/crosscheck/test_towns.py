@@ -11,7 +11,6 @@ from experiments import towns
 from scripts import towns_suite
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.files import read_text
 from dubins_traffic.maps.opendrive import OpenDrive
 from dubins_traffic.maps.settings import ImportSettings
 from dubins_traffic.maps.sumo import SumoNet
@@ -95,10 +94,8 @@ def test_rules_makes_counted_rounds_where_goals_are_within_reach(town: str) -> N
 @pytest.mark.parametrize(("town", "most"), [("A10KW", 1_000.0), ("DRT", 2_000.0)])
 def test_pairs_of_one_way_roads_are_held_as_one(town: str, most: float) -> None:
     """Metres dropped as one-way were 11,505 and 8,681 in these; `rules` drives on what is held."""
-    found = folder() / "game" / towns.MAPS[town]
-    text = read_text(str(found))
-    before = SumoNet().reduced(text).losses
-    document, losses = SumoNet().reduced(text, None, ImportSettings(pairs=25.0))
+    before = towns.reduced(town).losses
+    document, losses = SumoNet().reduced(towns.text_of(town), None, ImportSettings(pairs=25.0))
     dropped = [
         sum(metres for fate, why, _, metres in own.rows() if (fate, why) == ("dropped", "one-way"))
         for own in (before, losses)

@@ -19,7 +19,18 @@ import pytest
 
 import dubins_traffic as dt
 from dubins_traffic.record.sink import End
-from tests.ros import PATIENCE, ROOT, SYSTEM_PYTHON, configuration, finish, graph, lines, need_ros, read_until
+from tests.ros import (
+    PATIENCE,
+    ROOT,
+    SYSTEM_PYTHON,
+    Graph,
+    configuration,
+    finish,
+    graph,
+    lines,
+    need_ros,
+    read_until,
+)
 
 pytestmark = pytest.mark.tools
 
@@ -37,6 +48,26 @@ def busy(processes: int) -> Iterator[None]:
         for spinner in spinners:
             spinner.kill()
             spinner.wait()
+
+
+def untimed(folder: Path, trials: int, seconds: int, **more: object) -> Path:
+    """Write a configuration whose trials another maestro ends after so many seconds."""
+    document = json.loads(
+        configuration(folder, number_trials=trials, duration_bounds=[seconds] * 2).read_text()
+    )
+    del document["duration"]
+    config = folder / "old.json"
+    config.write_text(json.dumps(document | more))
+    return config
+
+
+def under_the_maestro(ros: Graph, config: Path, records: Path) -> tuple[subprocess.Popen[str], str]:
+    """Start a session in which `lanes` drives, and the maestro of 2016; return it, and where messages are."""
+    session = ros.session(config, "--maestro-elsewhere", "--controller", "lanes", "--records", records)
+    read_until(session, "waiting for a problem instance")
+    messages = str(ros.client_messages())
+    ros.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_maestro.py"], PYTHONPATH=messages)
+    return session, messages
 
 
 def test_a_node_that_asks_once_goes_through_all_trials_on_a_large_network_under_load(tmp_path: Path) -> None:
@@ -62,11 +93,7 @@ def test_a_node_that_asks_once_goes_through_all_trials_on_a_large_network_under_
 def test_the_maestro_of_2016_runs_the_trials_of_our_world(tmp_path: Path) -> None:
     """Its problems, its beginnings and its ends; our cars, our record, our score."""
     need_ros()
-    document = json.loads(configuration(tmp_path, number_trials=3, duration_bounds=[3, 3]).read_text())
-    del document["duration"]
-    config = tmp_path / "old.json"
-    config.write_text(json.dumps({**document, "number_goals_bounds": [2, 2]}))
-    records = tmp_path / "out"
+    config, records = untimed(tmp_path, 3, 3, number_goals_bounds=[2, 2]), tmp_path / "out"
     with graph(tmp_path) as ros:
         session = ros.session(config, "--maestro-elsewhere", "--records", records)
         said = read_until(session, "waiting for a problem instance")
@@ -96,15 +123,9 @@ def test_the_maestro_of_2016_runs_the_trials_of_our_world(tmp_path: Path) -> Non
 def test_a_trial_is_whole_by_the_clock_of_the_maestro_though_the_cars_moved_for_less(tmp_path: Path) -> None:
     """The session stands still for a second, as on a busy machine: it can't be caught up."""
     need_ros()
-    document = json.loads(configuration(tmp_path, number_trials=1, duration_bounds=[3, 3]).read_text())
-    del document["duration"]
-    config, records = tmp_path / "old.json", tmp_path / "out"
-    config.write_text(json.dumps(document))
+    config, records = untimed(tmp_path, 1, 3), tmp_path / "out"
     with graph(tmp_path) as ros:
-        session = ros.session(config, "--maestro-elsewhere", "--controller", "lanes", "--records", records)
-        read_until(session, "waiting for a problem instance")
-        messages = str(ros.client_messages())
-        ros.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_maestro.py"], PYTHONPATH=messages)
+        session, messages = under_the_maestro(ros, config, records)
         ros.start(
             [SYSTEM_PYTHON, ROOT / "tests" / "ros_2016.py", "1"], ROS_NAMESPACE="ego", PYTHONPATH=messages
         )
@@ -122,15 +143,9 @@ def test_a_trial_is_whole_by_the_clock_of_the_maestro_though_the_cars_moved_for_
 
 def test_a_reset_of_the_maestro_of_2016_is_a_reset(tmp_path: Path) -> None:
     need_ros()
-    document = json.loads(configuration(tmp_path, number_trials=1, duration_bounds=[600, 600]).read_text())
-    del document["duration"]
-    config, records = tmp_path / "old.json", tmp_path / "out"
-    config.write_text(json.dumps(document))
+    config, records = untimed(tmp_path, 1, 600), tmp_path / "out"
     with graph(tmp_path) as ros:
-        session = ros.session(config, "--maestro-elsewhere", "--controller", "lanes", "--records", records)
-        read_until(session, "waiting for a problem instance")
-        messages = str(ros.client_messages())
-        ros.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_maestro.py"], PYTHONPATH=messages)
+        session, messages = under_the_maestro(ros, config, records)
         code = (
             "import rospy; from dubins_traffic_msgs.srv import MMode; from std_srvs.srv import Empty\n"
             "rospy.wait_for_service('/dubins_traffic_maestro/mode')\n"

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
-from math import hypot
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import dubins_traffic as dt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.philox import Draws
+from dubins_traffic.maps.polylines import to_segments
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import Stream, draw, draw_many
 from dubins_traffic.problem.goals import Reach, draw_goals
@@ -50,36 +50,25 @@ def test_a_round_takes_at_most_that_share() -> None:
 
 
 def test_the_ego_starts_on_its_round() -> None:
-    """A second car's way round is the same, wherever on it the ego stands: it is on a lane between two of its goals."""
+    """A round through its goals and both ends of the lane on which it stands is no longer than one may be."""
     roads = dt.generate_network(12, 15, 4)
     own = load_config(document(0.5, network=None, rnd=roads.to_document(), number_goals_bounds=[2, 2]))
     for trial in range(20):
         instance = draw(own, 1, trial)
         network, start = instance.problem.network, instance.starts[0]
         limit, speed = 0.5 * 60, instance.problem.car.bounds.speed
-        lane = min(range(network.lanes), key=lambda k: _off(network, k, start.x, start.y, start.c, start.s))
+        point = np.array([[start.x, start.y]])
+        off = [
+            float(to_segments(point, np.array(network.lane_line(k, -0.3)))[0]) for k in range(network.lanes)
+        ]
+        assert min(off) < 1e-6
+        lane = int(np.argmin(off))
         with_end = {*instance.problem.goal_vertices, *network.lane_ends(lane)}
         assert round_time(network, sorted(with_end), speed) <= limit
     elsewhere = load_config(
         {**own.to_document(), "ego": {"start": [1.0, -0.3, 0.0]}, "rnd": ROAD.to_document()}
     )
     assert draw(elsewhere, 1, 0).starts[0].x == 1.0
-
-
-def _off(network: RoadNetwork, lane: int, x: float, y: float, c: float, s: float) -> float:
-    """Return how far a pose is from the middle of a lane, metres, and more if it is headed another way."""
-    line = network.lane_line(lane, -0.3)
-    metres = [
-        (_distance(a, b, x, y), (b[0] - a[0]) * c + (b[1] - a[1]) * s) for a, b in pairwise(map(tuple, line))
-    ]
-    far, along = min(metres)
-    return far + (1e3 if along < 0 else 0.0)
-
-
-def _distance(a: tuple[float, ...], b: tuple[float, ...], x: float, y: float) -> float:
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    share = min(1.0, max(0.0, ((x - a[0]) * dx + (y - a[1]) * dy) / (dx * dx + dy * dy)))
-    return hypot(x - a[0] - share * dx, y - a[1] - share * dy)
 
 
 def test_together_they_are_drawn_as_one_by_one() -> None:

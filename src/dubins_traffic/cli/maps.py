@@ -52,7 +52,7 @@ def imported(
     text = read_text(file)
     form = formats.of_text(text)
     if not isinstance(form, ForeignFormat):
-        require_no_scale(file, scale, w, part, pairs)
+        require_no_map_options(file, scale, w, part, pairs)
         return RoadNetwork.from_text(text, file, form)
     settings = ImportSettings(
         w=W if w is None else w, scale=scale, tolerance=tolerance, pairs=0.0 if pairs is None else pairs
@@ -77,7 +77,7 @@ def part_asked(clip: str | None, around: tuple[str, float] | None) -> Part | Non
     return None if around is None else Around(*around)
 
 
-def require_no_scale(
+def require_no_map_options(
     source: str | None,
     scale: float | None,
     w: float | None,

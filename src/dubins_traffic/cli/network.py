@@ -136,7 +136,7 @@ def network(
     )
     part = maps.part_asked(clip, around)
     if source is None:
-        maps.require_no_scale(None, scale, w, part, pairs)
+        maps.require_no_map_options(None, scale, w, part, pairs)
     if source is not None:
         if (intersections, segments, grid) != (None, None, None):
             raise InputError(

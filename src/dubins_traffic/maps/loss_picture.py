@@ -22,7 +22,6 @@ COLOURS: dict[str, str] = {
     OFF: palette.CONTACT_COLOUR,
     Reason.CLOSED: palette.ROAD_COLOUR,
     Reason.ONE_WAY: "#E69F00",
-    Reason.PAIR: "#0072B2",
     Reason.LANES: "#CC79A7",
     Reason.DEGREE: "#882255",
     Reason.JUNCTIONS: "#999933",

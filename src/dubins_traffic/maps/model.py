@@ -143,6 +143,12 @@ class RoadMap:
             )
 
 
+def map_of(junctions: Mapping[str, Junction], roads: Sequence[Road]) -> RoadMap:
+    """Return the map of roads, with those of some junctions at which they end."""
+    ends = {end for road in roads for end in (road.first, road.last)}
+    return RoadMap({name: place for name, place in junctions.items() if name in ends}, roads)
+
+
 _PLACE = f"finite coordinates in [-{LARGEST:g}, {LARGEST:g}]"
 
 

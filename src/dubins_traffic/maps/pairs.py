@@ -17,13 +17,13 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.maps.junctions import Union, gap, spread
-from dubins_traffic.maps.model import Junction, Road, RoadMap
+from dubins_traffic.maps.model import Junction, Road, RoadMap, map_of
 from dubins_traffic.maps.polylines import along, at, cleaned, stretch
 
 FACING = -0.8
 """Roads face each other where the cosine between their directions is at most this."""
 SHORT = 1e-150
-"""A side is at least this long, metres, so that its square is not 0 where a point of a map is doubled."""
+"""A side is at least this long, metres, so that its square is not 0 where a road has no length."""
 SNAP = 0.5
 """A road is not cut nearer than so many times the distance asked for to one of its ends: the end is taken."""
 INSIDE = 3.0
@@ -34,12 +34,11 @@ UNEVEN = 2.0
 
 def merged(found: RoadMap, within: float) -> RoadMap:
     """Return a map whose pairs of one-way roads at most `within` metres apart are roads with one lane each way."""
-    one_way = [
-        k
+    ways = {
+        k: _forward(road)
         for k, road in enumerate(found.roads)
         if bool(road.forward) != bool(road.backward) and not road.closed
-    ]
-    ways = {k: _forward(found.roads[k]) for k in one_way}
+    }
     if not ways:
         return found
     beside = _Sides(ways, within)
@@ -62,27 +61,22 @@ def merged(found: RoadMap, within: float) -> RoadMap:
             if first == last and piece.first != piece.last and piece.length <= INSIDE * within:
                 continue
             (pieces if k in ways else whole).append(replace(piece, first=first, last=last))
-    roads = (*whole, *_paired(pieces, UNEVEN * within))
-    ends = {end for road in roads for end in (road.first, road.last)}
-    return replace(
-        found, roads=roads, junctions={name: junctions[name] for name in junctions if name in ends}
-    )
+    return map_of(junctions, (*whole, *_paired(pieces, UNEVEN * within)))
 
 
 def _forward(road: Road) -> Road:
     """Return a one-way road with its line in the direction of its lanes, and no point of it doubled."""
-    line = cleaned(road.line if road.forward else road.line[::-1])
     if road.forward:
-        return replace(road, line=line)
-    return replace(
-        road, first=road.last, last=road.first, line=line, forward=road.backward, backward=0, corners=None
-    )
+        return replace(road, line=cleaned(road.line))
+    line = cleaned(road.line[::-1])
+    turned = replace(road, first=road.last, last=road.first, line=line, corners=None)
+    return replace(turned, forward=road.backward, backward=0)
 
 
 def _heading(line: Floats, *, begins: bool) -> tuple[float, float]:
     """Return the direction of a line at one of its ends, a unit vector."""
     step = line[1] - line[0] if begins else line[-1] - line[-2]
-    unit = step / max(float(np.hypot(*step)), 1e-300)
+    unit = step / max(float(np.hypot(*step)), SHORT)
     return float(unit[0]), float(unit[1])
 
 

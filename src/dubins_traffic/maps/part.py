@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from difflib import get_close_matches
 from typing import Final
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.maps.losses import Losses, NothingHeldError
-from dubins_traffic.maps.model import RoadMap
+from dubins_traffic.maps.model import RoadMap, map_of
 from dubins_traffic.roads.network import RoadNetwork
 
 CLIP: Final = "--clip"
@@ -96,9 +96,7 @@ def part_of(found: RoadMap, part: Part, file: str | None = None) -> RoadMap:
             "no road lies wholly in this part", file=file, field=str(part),
             expected=f"a part that holds some of the map's {len(found.roads)} roads",
         )  # fmt: skip
-    ends = {end for road in roads for end in (road.first, road.last)}
-    junctions = {name: place for name, place in found.junctions.items() if name in ends}
-    return replace(found, roads=roads, junctions=junctions, frame=None)
+    return map_of(found.junctions, roads)
 
 
 class NoLoopError(NothingHeldError):
