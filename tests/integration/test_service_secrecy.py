@@ -7,6 +7,7 @@ import contextlib
 import gzip
 import io
 import json
+import os
 import re
 import sqlite3
 import struct
@@ -94,10 +95,21 @@ def unpacked(data: bytes) -> Iterator[bytes]:
             continue
 
 
+def files_below(folder: Path) -> Iterator[Path]:
+    """Yield the files below a folder; a folder that a worker has just removed has none."""
+
+    def told(error: OSError) -> None:
+        if not isinstance(error, FileNotFoundError | NotADirectoryError):
+            raise error
+
+    for where, _, names in os.walk(folder, onerror=told):
+        yield from (Path(where) / name for name in names)
+
+
 def holding(folders: list[Path], wanted: set[bytes]) -> list[str]:
     """Return the files in which something wanted stands."""
     found: list[str] = []
-    for path in (each for folder in folders for each in (folder, *sorted(folder.rglob("*")))):
+    for path in (each for folder in folders for each in (folder, *sorted(files_below(folder)))):
         try:
             data = path.read_bytes() if path.is_file() else b""
         except FileNotFoundError:  # of a worker that has just removed it

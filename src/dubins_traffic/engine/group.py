@@ -293,7 +293,7 @@ class Group:
         world, name = self._world, bare_name(controller)
         rows, endings = np.array(trials), [ending for b in trials if (ending := self.endings[b]) is not None]
         judged = [own for b in trials if (own := self.instances[b].problem).rules]
-        find_all((problem.network, problem.goal_vertices) for problem in judged)
+        find_all([(problem.network, problem.goal_vertices) for problem in judged])
         margins = self.margins(rows)
         found: list[Outcome] = []
         pending = pending_of(rows, world.terms, world.breach_log)
