@@ -180,6 +180,19 @@ def in_a_disc(number: int) -> Made:
     return _blocked(stage, lane, [("Swings", {"back": stage.dice.choice((0.0, 0.1))}, place)])
 
 
+def in_the_way(number: int) -> Made:
+    """A car ahead of the ego, or one that comes toward it, bars its way in a bend once the ego is in there too."""
+    stage = Stage(number, RING, fixed=True)
+    lane = stage.dice.choice((0, 1))
+    comes = stage.dice.random() < 0.5
+    own = {"speed": stage.dice.uniform(0.3, 0.6), "cuts": comes}
+    half = 0.5 * stage.length(lane)
+    after = stage.exit_of(lane)
+    agent = stage.pose(after ^ 1, half) if comes else stage.pose(lane, half + stage.dice.uniform(0.7, 0.9))
+    goals = (stage.end(lane ^ 1), stage.end(after))
+    return stage.instance(stage.pose(lane, half - 0.2), [("Bars", own, agent)], goals, 150.0, SOON), "rules"
+
+
 def over_the_line(number: int) -> Made:
     """A car starts on the centre line or left of it, and stays there."""
     stage, lane = _any_stage(number)
@@ -236,6 +249,6 @@ BLOCKING: Final[Mapping[str, Scene]] = {
     own.__name__: own
     for own in (
         passed, abreast, disc_edge_out, disc_edge_in, both_edges, beside_obstacle, before_obstacle, head_on,
-        before_queue, shuttle, ring, crawler, spinner, in_a_disc, over_the_line, holder, any_pair, any_tour,
+        before_queue, shuttle, ring, crawler, spinner, in_a_disc, in_the_way, over_the_line, holder, any_pair, any_tour,
     )
 }  # fmt: skip

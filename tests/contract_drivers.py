@@ -7,6 +7,8 @@ from collections.abc import Mapping, Sequence
 from random import Random
 from typing import Any, ClassVar
 
+import numpy as np
+
 from dubins_traffic.cars.state import Command, Observation, Pose
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.problem.instance import Instance, Problem
@@ -139,6 +141,33 @@ class Tours(Driver):
         return False
 
 
+class Presses(Driver):
+    """Drives up close beside whoever is in a bend, `side` radians left of the way that he looks, and stays there."""
+
+    parameters: ClassVar = {"side": 2.0, "gap": 0.02}
+
+    def drive(self, seen: Observation) -> tuple[float, float]:
+        network, found = self.problem.network, []
+        for other in seen.others:
+            far = np.hypot(*(network.points - (other.pose.x, other.pose.y)).T)
+            bend = int(far.argmin())
+            if network.degrees[bend] == 2 and far[bend] < self.problem.intersection_radius:
+                found.append((math.dist(other.pose[:2], seen.pose[:2]), other.pose))
+        if not found:
+            return 0.0, 0.0
+        far, its = min(found)
+        away = 2.0 * self.problem.car.body.reach + self.own["gap"]
+        angle = math.atan2(its.s, its.c) + self.own["side"]
+        x, y = its.x + away * math.cos(angle) - seen.pose.x, its.y + away * math.sin(angle) - seen.pose.y
+        if far > 2.5 or math.hypot(x, y) < 0.01:
+            return 0.0, 0.0
+        turn = math.atan2(y * seen.pose.c - x * seen.pose.s, x * seen.pose.c + y * seen.pose.s)
+        most = self.problem.car.bounds
+        if abs(turn) > 0.2:
+            return 0.0, max(-most.yaw_rate, min(most.yaw_rate, turn * self.problem.rate))
+        return self.speed_to(math.hypot(x, y)), turn
+
+
 class Lawful(Driver):
     """Drives as the controller `rules` does round the goals of the ego; the base of those with a habit."""
 
@@ -178,6 +207,49 @@ class Slow(Lawful):
     def habit(self, seen: Observation, law: Command) -> tuple[float, float]:  # noqa: ARG002  # others look
         share = min(1.0, self.own["speed"] / max(abs(law.speed), 1e-9))
         return law.speed * share, law.yaw_rate * share
+
+
+class Bars(Lawful):
+    """Keeps the law, but bars the ego's way in a bend that is no goal, once the ego has come in after it.
+
+    It drives up before the ego if it `cuts`; then, or else at once, it stands.
+    """
+
+    parameters: ClassVar = {"speed": 0.5, "cuts": False}
+    NEARLY = 0.6
+
+    def habit(self, seen: Observation, law: Command) -> tuple[float, float]:
+        here, ego = self._bend(seen.pose), next((other.pose for other in seen.others if other.index == 0), None)
+        before = here == getattr(self, "here", -1)
+        self.here = here
+        self.first: bool = here >= 0 and (self.first if before else ego is None or self._bend(ego) != here)
+        if not self.first or ego is None or self._bend(ego) != here:
+            share = min(1.0, self.own["speed"] / max(abs(law.speed), 1e-9))
+            return law.speed * share, law.yaw_rate * share
+        return self._before(seen, ego, here) if self.own["cuts"] else (0.0, 0.0)
+
+    def _bend(self, pose: Pose) -> int:
+        """Return the bend that a body at a pose meets and that is no goal, -1 for none."""
+        network, problem = self.problem.network, self.problem
+        far = np.hypot(*(network.points - (pose.x, pose.y)).T)
+        bend = int(far.argmin())
+        is_one = network.degrees[bend] == 2 and bend not in problem.goal_vertices
+        return bend if is_one and far[bend] < problem.intersection_radius + problem.car.body.reach else -1
+
+    def _before(self, seen: Observation, ego: Pose, bend: int) -> tuple[float, float]:
+        """Drive toward where the ego will be, and stand as soon as that is close."""
+        x, y = ego.x + self.NEARLY * ego.c - seen.pose.x, ego.y + self.NEARLY * ego.s - seen.pose.y
+        most = self.problem.car.bounds
+        reach = 2.0 * self.problem.car.body.reach + 3.0 * most.speed / self.problem.rate
+        close = math.hypot(ego.x - seen.pose.x, ego.y - seen.pose.y) < reach
+        there = self.problem.network.points[bend]
+        inside = math.dist((seen.pose.x, seen.pose.y), there) < 0.9 * self.problem.intersection_radius
+        if close or not inside or math.hypot(x, y) < SLACK:
+            return 0.0, 0.0
+        turn = math.atan2(y * seen.pose.c - x * seen.pose.s, x * seen.pose.c + y * seen.pose.s)
+        if abs(turn) > 0.2:
+            return 0.0, max(-most.yaw_rate, min(most.yaw_rate, turn * self.problem.rate))
+        return self.own["speed"], turn
 
 
 class Whims(Lawful):

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import Final
 
-from dubins_traffic.cars.body import Disc
+from dubins_traffic.cars.body import Body, Disc
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.controllers.shield import Shield
 from dubins_traffic.protocols import Controller
 from tests import contract_drivers as drivers
-from tests.contract_stages import ELBOW, RADIUS, TEE, Made, Placed, Scene, Stage
+from tests.contract_stages import BODIES, ELBOW, RADIUS, TEE, Made, Placed, Scene, Stage
 
 
 def _provoked(
@@ -44,9 +44,9 @@ def _provoked(
     return stage.instance(ego, agents, goals, 150.0, rules or {}), driver
 
 
-def _bend_stage(number: int) -> tuple[Stage, int, int]:
+def _bend_stage(number: int, body: Body | None = None) -> tuple[Stage, int, int]:
     """Return a stage, a lane into a bend, and the lane out of it."""
-    stage = Stage(number, None if number % 3 == 0 else ELBOW)
+    stage = Stage(number, None if number % 3 == 0 else ELBOW, body=body)
     lane = stage.lane_into(2)
     return stage, lane, stage.exit_of(lane)
 
@@ -152,6 +152,19 @@ def ego_in_bend(number: int) -> Made:
     return _provoked(stage, lane, place, drivers.AsEgo(drivers.Stands()))
 
 
+def ego_presses(number: int) -> Made:
+    """The ego comes into a bend after others, stands as close to one as it may, and stays with it.
+
+    All are discs: rectangles are brought to breaches like that (docs/theory.md#on-the-road).
+    """
+    stage, lane, out = _bend_stage(number, BODIES[0])
+    far = RADIUS + stage.reach + stage.dice.uniform(0.02, 0.5)
+    own = stage.dice.choice((lane, out ^ 1))
+    side = stage.dice.choice((-1.0, 1.0)) * stage.dice.uniform(1.3, 3.1)
+    inner = drivers.AsEgo(drivers.Presses(), side=side, gap=stage.dice.uniform(0.005, 0.1))
+    return _provoked(stage, lane, stage.pose(own, stage.length(own) - far), Shield(inner))
+
+
 def ego_by_obstacle(number: int) -> Made:
     """The ego stands beside an obstacle, so that nobody passes it."""
     stage = Stage(number, (ELBOW, None)[number // 3 % 2])
@@ -201,6 +214,6 @@ PROVOKING: Final[Mapping[str, Scene]] = {
     own.__name__: own
     for own in (
         ego_beyond_exit, ego_beyond_crossing, ego_closes, ego_closes_crossing, ego_tilted, ego_beside_line, ego_slow,
-        ego_swings, ego_at_edge, ego_in_bend, ego_by_obstacle, ego_beyond_obstacle, ego_holds, ego_whims,
+        ego_swings, ego_at_edge, ego_in_bend, ego_presses, ego_by_obstacle, ego_beyond_obstacle, ego_holds, ego_whims,
     )
 }  # fmt: skip

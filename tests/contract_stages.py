@@ -22,7 +22,7 @@ from dubins_traffic.rules.parameters import RuleParameters
 
 RADIUS: Final = 1.0
 BODIES: Final[tuple[Body, ...]] = (Disc(0.177), Rectangle(0.4, 0.25), Rectangle(0.62, 0.28))
-SOON: Final[Mapping[str, float]] = {"rest_time": 10.0, "journey_start_time": 5.0, "goal_time": 20.0}
+SOON: Final[Mapping[str, float]] = {"rest_time": 10.0, "journey_start_time": 5.0, "goal_time": 20.0, "shared_time": 10.0}
 """Limits by which a blocker is named soon; only where no car is `lawful`, which may need longer."""
 ELBOW: Final = ((0, 0, 1, 0), (1, 0, 1, 1), (1, 1, 2, 1))
 RING: Final = ((0, 0, 1, 0), (1, 0, 1, 1), (1, 1, 0, 1), (0, 1, 0, 0))
@@ -38,10 +38,11 @@ class Stage:
         segments: tuple[tuple[int, int, int, int], ...] | None = None,
         *,
         fixed: bool = False,
+        body: Body | None = None,
     ) -> None:
         self.dice = dice = Random(number)
         self.rate = (10.0, 30.0)[number % 2]
-        self.body: Body = BODIES[number // 2 % len(BODIES)]
+        self.body: Body = body or BODIES[number // 2 % len(BODIES)]
         length = dice.choice((3.3, 4.0, 5.0))
         move = (dice.uniform(-9.0, 9.0), dice.uniform(-9.0, 9.0), dice.uniform(-3.0, 3.0))
         if number % 5 == 4 and not fixed:

@@ -202,10 +202,10 @@ class Judge:
         if any(self.gone(m, n, v) for m in range(own, k + 1)):
             self.fired["out before the ego"] += ego >= own
             return False
-        if ego == own:
-            self.fired["same tick"] += 1
-            return k - own <= self.ticks(self.rules.shared_time)
-        return ego > own
+        lately = k - ego <= self.ticks(self.rules.shared_time)
+        if ego >= own:
+            self.fired["same tick" if ego == own else "later"] += lately
+        return ego >= own and lately
 
     def way(self, k: int, n: int) -> str:
         """E5: whether the way of a car is "free", or it is excused "for a while", or while it is so (empty)."""

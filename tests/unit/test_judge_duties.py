@@ -200,6 +200,8 @@ def test_e4_seconds_do_not_count_in_which_the_ego_has_come_into_the_disc(roads: 
     assert found(range(20, 120), agent=20) == []
     assert found(range(20, 120), agent=20, shared_time=3.0) == [("E4", 1, 100, 20)]
     assert found(range(20, 30), agent=20) == [("E4", 1, 79, 20)]
+    assert found(range(20, 120), shared_time=3.0) == [("E4", 1, 81, 0)]
+    assert found(range(30, 120), agent=20, shared_time=3.0) == [("E4", 1, 101, 20)]
 
 
 @both

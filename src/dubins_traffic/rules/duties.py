@@ -79,9 +79,9 @@ def _judge_journey(b: int, n: int, tick: int, tables: RefereeTables) -> int:
 def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int:
     """Judge E4 for e-agent n of trial b, whose body meets the disc of v.
 
-    Ticks do not count while the ego, too, is in the disc and came there later, or, up to `shared_time`, in the same
-    tick, unless the car's centre has been out of it. Returns the tick in which to judge again if the car's labels stay
-    the same.
+    Ticks do not count while the ego, too, is in the disc and came there later or in the same tick, at most
+    `shared_time` ago, unless the car's centre has been out of it. Returns the tick in which to judge again if the car's
+    labels stay the same.
 
     Norm: docs/rules.md#E4, docs/rules.md#pause.
     """
@@ -93,9 +93,8 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
         car.been_out = 1
     paused = False
     if tables.labels.crosses[b, EGO] == v and car.been_out == 0:
-        shares = ego.in_since == car.in_since
-        lately = tick - car.in_since <= terms.shared_ticks
-        paused = ego.in_since > car.in_since or (shares and lately)
+        lately = tick - ego.in_since <= terms.shared_ticks
+        paused = ego.in_since >= car.in_since and lately
     if not free and car.exit_since >= 0:
         car.exit_spent += tick - 1 - car.exit_since - car.exit_paused
     car.exit_since = run(free, tick, car.exit_since)

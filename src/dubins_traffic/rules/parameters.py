@@ -111,7 +111,7 @@ class RuleParameters:
     exit_time: float = 5.0
     """E4: a disc with a free exit is left within this time."""
     shared_time: float = 60.0
-    """E4: so long the time does not count in which the ego is in the disc since the same tick as the car."""
+    """E4: so long the time does not count in which the ego is in the disc, if it came with the car or after it."""
     way_distance: float = 1.5
     """E5: the way is free if nothing narrows the lane within this distance, and no full bend is within it."""
     rest_time: float = 60.0
