@@ -219,7 +219,8 @@ class Bars(Lawful):
     NEARLY = 0.6
 
     def habit(self, seen: Observation, law: Command) -> tuple[float, float]:
-        here, ego = self._bend(seen.pose), next((other.pose for other in seen.others if other.index == 0), None)
+        here = self._bend(seen.pose)
+        ego = next((other.pose for other in seen.others if other.index == 0), None)
         before = here == getattr(self, "here", -1)
         self.here = here
         self.first: bool = here >= 0 and (self.first if before else ego is None or self._bend(ego) != here)

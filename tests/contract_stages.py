@@ -22,7 +22,9 @@ from dubins_traffic.rules.parameters import RuleParameters
 
 RADIUS: Final = 1.0
 BODIES: Final[tuple[Body, ...]] = (Disc(0.177), Rectangle(0.4, 0.25), Rectangle(0.62, 0.28))
-SOON: Final[Mapping[str, float]] = {"rest_time": 10.0, "journey_start_time": 5.0, "goal_time": 20.0, "shared_time": 10.0}
+SOON: Final[Mapping[str, float]] = {
+    "rest_time": 10.0, "journey_start_time": 5.0, "goal_time": 20.0, "shared_time": 10.0
+}  # fmt: skip
 """Limits by which a blocker is named soon; only where no car is `lawful`, which may need longer."""
 ELBOW: Final = ((0, 0, 1, 0), (1, 0, 1, 1), (1, 1, 2, 1))
 RING: Final = ((0, 0, 1, 0), (1, 0, 1, 1), (1, 1, 0, 1), (0, 1, 0, 0))
