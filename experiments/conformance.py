@@ -22,7 +22,7 @@ from typing import Final
 
 from benchmarks.table import Row, show
 from tests.contract_blocking import BLOCKING
-from tests.contract_provoking import PROVOKING
+from tests.contract_provoking import PROVOKING, UNCLAIMED
 from tests.contract_scenes import SCENES, Came, trial
 
 from experiments.stored import code, store, write_page
@@ -90,14 +90,22 @@ def bars(found: Sequence[Came]) -> list[Row]:
     admitted = [own for own in found if own.admitted]
     blocking = [own for own in admitted if own.name in BLOCKING]
     provoking = [own for own in admitted if own.name in PROVOKING and not own.own]
-    for name, own, says in (
-        ("who blocks", blocking, "the ego waits longer than the bound, or breaks a rule first"),
-        ("who provokes", provoking, "a lawful car breaks a rule"),
+    unclaimed = [own for own in admitted if own.name in UNCLAIMED and not own.own]
+    for name, own, says, bar in (
+        ("who blocks", blocking, "the ego waits longer than the bound, or breaks a rule first", "0"),
+        ("who provokes", provoking, "a lawful car breaks a rule", "0"),
+        (
+            "who presses against rectangles in a bend, not claimed",
+            unclaimed,
+            "a lawful car breaks a rule",
+            "",
+        ),
     ):
         missed = [one for one in own if failed(one)]
         scenes = ", ".join(sorted({one.name for one in missed}))
-        told = f"{len(missed)}" + (f" ({scenes})" if scenes else "")
-        rows.append(Row(f"{name}, {len(own):,} trials of {SECONDS:.0f} s: {says}", told, "0", not missed))
+        told = f"{len(missed)}" + (f" ({scenes})" if scenes and bar else "")
+        met = not missed or not bar
+        rows.append(Row(f"{name}, {len(own):,} trials of {SECONDS:.0f} s: {says}", told, bar, met))
     waits = [one.waited / one.bound for one in blocking if not failed(one)]
     rows.append(
         Row("longest wait of the others, share of its bound", f"{max(waits, default=0.0):.2f}", "", True)

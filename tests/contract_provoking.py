@@ -152,17 +152,19 @@ def ego_in_bend(number: int) -> Made:
     return _provoked(stage, lane, place, drivers.AsEgo(drivers.Stands()))
 
 
-def ego_presses(number: int) -> Made:
-    """The ego comes into a bend after others, stands as close to one as it may, and stays with it.
-
-    All are discs: rectangles are brought to breaches like that (docs/theory.md#on-the-road).
-    """
-    stage, lane, out = _bend_stage(number, BODIES[0])
+def ego_presses(number: int, body: Body = BODIES[0]) -> Made:
+    """The ego comes into a bend after others, stands as close to one as it may, and stays with it; all are discs."""
+    stage, lane, out = _bend_stage(number, body)
     far = RADIUS + stage.reach + stage.dice.uniform(0.02, 0.5)
     own = stage.dice.choice((lane, out ^ 1))
     side = stage.dice.choice((-1.0, 1.0)) * stage.dice.uniform(1.3, 3.1)
     inner = drivers.AsEgo(drivers.Presses(), side=side, gap=stage.dice.uniform(0.005, 0.1))
     return _provoked(stage, lane, stage.pose(own, stage.length(own) - far), Shield(inner))
+
+
+def ego_presses_boxes(number: int) -> Made:
+    """Do as `ego_presses`, where all are rectangles."""
+    return ego_presses(number, BODIES[1 + number // 2 % 2])
 
 
 def ego_by_obstacle(number: int) -> Made:
@@ -217,3 +219,5 @@ PROVOKING: Final[Mapping[str, Scene]] = {
         ego_swings, ego_at_edge, ego_in_bend, ego_presses, ego_by_obstacle, ego_beyond_obstacle, ego_holds, ego_whims,
     )
 }  # fmt: skip
+UNCLAIMED: Final[Mapping[str, Scene]] = {"ego_presses_boxes": ego_presses_boxes}
+"""Scenes of which it is measured, not claimed, that no lawful car breaks a rule (docs/theory.md#on-the-road)."""

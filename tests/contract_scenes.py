@@ -19,10 +19,10 @@ from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.judging import Judging
 from tests.contract_blocking import BLOCKING
-from tests.contract_provoking import PROVOKING
+from tests.contract_provoking import PROVOKING, UNCLAIMED
 from tests.contract_stages import Scene
 
-SCENES: Final[Mapping[str, Scene]] = {**BLOCKING, **PROVOKING}
+SCENES: Final[Mapping[str, Scene]] = {**BLOCKING, **PROVOKING, **UNCLAIMED}
 
 
 @dataclass(frozen=True, slots=True)

@@ -100,7 +100,9 @@ def move(
         )
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     elif not safe and (passes or steep == ABRUPT or offset < 0.0):
-        across, narrow = 1.0 if left > offset else -1.0, within_lane(drivers.car[b, n].aside, vehicle)
+        # Who leans past a body and is farther right than he would be drives straight on, and not up to it.
+        back = -1.0 if passes or offset >= 0.0 else 0.0
+        across, narrow = 1.0 if left > offset else back, within_lane(drivers.car[b, n].aside, vehicle)
         speed, yaw_rate = steer(
             c, s, across, px, py, bend, allowed, NIMBLE if narrow else SQUARE, aligned, limit, vehicle.tightest,
             vehicle.period,
