@@ -117,6 +117,16 @@ def head_on(number: int) -> Made:
     ])  # fmt: skip
 
 
+def face_to_face(number: int) -> Made:
+    """A car that is left before an obstacle drives up to the ego, and stands before it."""
+    stage, lane = _any_stage(number)
+    middle, dice = 0.5 * stage.length(lane), stage.dice
+    stage.block(lane, middle, lateral=-0.4, radius=0.15)
+    own = {"near": dice.uniform(1.0, 3.0), "gap": dice.uniform(0.02, 0.3), "speed": dice.uniform(0.1, 0.7)}
+    place = stage.pose(lane, middle - dice.uniform(0.2, 1.0) - stage.reach, dice.uniform(0.0, 0.3))
+    return _blocked(stage, lane, [("Faces", own, place)])
+
+
 def before_queue(number: int) -> Made:
     """A car swings before the line of a crossing, so that tickets come and go."""
     stage = Stage(number, TEE)
@@ -249,6 +259,7 @@ BLOCKING: Final[Mapping[str, Scene]] = {
     own.__name__: own
     for own in (
         passed, abreast, disc_edge_out, disc_edge_in, both_edges, beside_obstacle, before_obstacle, head_on,
-        before_queue, shuttle, ring, crawler, spinner, in_a_disc, in_the_way, over_the_line, holder, any_pair, any_tour,
+        face_to_face, before_queue, shuttle, ring, crawler, spinner, in_a_disc, in_the_way, over_the_line, holder,
+        any_pair, any_tour,
     )
 }  # fmt: skip

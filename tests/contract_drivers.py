@@ -168,6 +168,28 @@ class Presses(Driver):
         return self.speed_to(math.hypot(x, y)), turn
 
 
+class Faces(Driver):
+    """Stands; drives straight up to a car ahead that is near, until a gap is left.
+
+    Only the ego counts, or only who is left of the centre line if it `minds` that.
+    """
+
+    parameters: ClassVar = {"near": 3.0, "gap": 0.1, "speed": 0.3, "minds": False}
+
+    def drive(self, seen: Observation) -> tuple[float, float]:
+        body, most = self.problem.car.body, self.problem.car.bounds.speed
+        far = math.inf
+        for other in seen.others:
+            x, y = other.pose.x - seen.pose.x, other.pose.y - seen.pose.y
+            wanted = other.propositions.bits & FLAG.LEFT if self.own["minds"] else other.index == 0
+            if wanted and x * seen.pose.c + y * seen.pose.s > 0.0:
+                far = min(far, math.hypot(x, y) - 2.0 * body.reach)
+        # It may not close in on who comes as fast as it can.
+        if far > self.own["near"] or far < self.own["gap"] + 2.0 * most / self.problem.rate:
+            return 0.0, 0.0
+        return min(self.own["speed"], self.speed_to(far - self.own["gap"])), 0.0
+
+
 class Lawful(Driver):
     """Drives as the controller `rules` does round the goals of the ego; the base of those with a habit."""
 

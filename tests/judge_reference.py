@@ -46,9 +46,10 @@ class Judge:
         }  # fmt: skip
 
     def sides(self, car: Car) -> dict[tuple[int, int], tuple[float, float]]:
-        """Between which laterals a body is, in the two lanes of the segment nearest to it."""
-        segment = car.facts["segment"]
-        return {lane: self.reference.lateral_range(lane, car) for lane in ((segment, 0), (segment, 1))}
+        """Between which laterals a body is, in the lanes of the segment nearest to it, and out of the disc it is in."""
+        segment, v = car.facts["segment"], car.facts["at"]
+        lanes = {(segment, 0), (segment, 1), *(self.arms(v) if v >= 0 else ())}
+        return {lane: self.reference.lateral_range(lane, car) for lane in lanes}
 
     def stays_of(self, n: int) -> Found:
         """E4: the breaches of a car, at most one a stay; also note the frames in which it has stayed for too long."""
@@ -127,16 +128,16 @@ class Judge:
     def bend(self, v: int) -> bool:
         return len(self.arms(v)) >= 2 and not self.reference.crossing(v)
 
-    def contends(self, k: int, other: int, v: int, came: int) -> bool:
-        """Whether who is in the disc of v may be in the way of a car that came by `came`, by being nearer to an exit.
+    def contends(self, k: int, other: int, v: int, came: int, arm: tuple[int, int]) -> bool:
+        """Whether who is in the disc of v is in the way of a car that came by `came`, being nearer to an exit.
 
-        At a bend only the ego may, and who started there or came by the same segment.
+        At a bend only who started there or came by the same segment, and the ego where its body narrows that lane.
         """
         its = self.came_by(k, other)
-        if other == 0 or its < 0 or not self.bend(v) or (came >= 0 and its // 2 == came // 2):
+        if its < 0 or not self.bend(v) or (came >= 0 and its // 2 == came // 2):
             return True
         self.fired["passes by"] += 1
-        return False
+        return other == 0 and self.reference.narrows(*self.past[k][other]["sides"][arm])
 
     def mouth(self, arm: tuple[int, int], spot: tuple[float, float]) -> float:
         s, lateral = self.reference.coordinates(arm, *spot)
@@ -166,14 +167,14 @@ class Judge:
             if other == n:
                 continue
             nearer = facts[other]["at"] == v and self.mouth(arm, facts[other]["spot"]) < own
-            if nearer and self.contends(k, other, v, came):
+            if nearer and self.contends(k, other, v, came, arm):
                 self.fired["nearer"] += 1
                 return False
             if self.takes(k, other, v, arm):
                 return False
         radius, gap = self.problem.intersection_radius, self.rules.exit_gap
         end = radius + max(gap, 2 * self.problem.car.body.reach + gap / 4)
-        for obstacle in self.problem.obstacles:
+        for obstacle in self.problem.obstacles if self.gone(k, n, v) != arm else ():
             reach = self.reference.obstacle_range(arm, obstacle, radius, end)
             if reach is not None and self.reference.narrows(*reach):
                 self.fired["narrow exit"] += 1
@@ -212,21 +213,19 @@ class Judge:
         facts, ego = self.past[k][n], self.past[k][0]
         if facts["lane"] < 0 or (facts["stopped"] and not (facts["first"] and facts["clear"])):
             return ""
-        lane, found = divmod(facts["lane"], 2), "free"
+        lane = divmod(facts["lane"], 2)
         if facts["left"]:
             hems = 2.0 * self.problem.car.body.reach + self.rules.overtaking_behind
-            if n != 0 and math.dist(facts["spot"], ego["spot"]) <= hems:
-                self.fired["left by the ego"] += 1
-                found = "for a while" if ego["lane"] == facts["lane"] and not ego["left"] else ""
-                self.fired["left before the ego"] += bool(found)
-        elif self.narrow_ahead(k, n, lane) or self.lacks_room(k, n, lane):
-            found = ""
+            near = n != 0 and math.dist(facts["spot"], ego["spot"]) <= hems
+            self.fired["left by the ego"] += near
+            return "for a while" if near else "free"
+        if self.narrow_ahead(k, n, lane) or self.lacks_room(k, n, lane):
+            return ""
         v = self.reference.toward(lane)
         begins = self.reference.length(lane[0]) - self.problem.intersection_radius
         if self.reference.crossing(v) or begins - facts["progress"] > self.rules.way_distance:
-            return found
-        enters = self.may_enter(k, n, v, facts["lane"])
-        return min(found, enters, key=("", "for a while", "free").index)
+            return "free"
+        return self.may_enter(k, n, v, facts["lane"])
 
     def narrow_ahead(self, k: int, n: int, lane: tuple[int, int]) -> bool:
         """E5: whether a body narrows the lane of a car before it."""

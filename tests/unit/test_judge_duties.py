@@ -132,6 +132,25 @@ def test_e4_no_exit_is_free_with_somebody_near_in_each(roads: RoadNetwork) -> No
 
 
 @both
+def test_e4_an_obstacle_takes_nothing_of_a_lane_on_which_the_centre_is_already(roads: RoadNetwork) -> None:
+    """All other exits are taken; the body meets the disc, and the centre is in it, or just out of it."""
+    out = lanes_out(roads)
+    taken = [after(roads, lane, 0.4) for lane in out[1:]]
+
+    def found(own: tuple[float, ...]) -> list[tuple[object, ...]]:
+        trial = case(roads, len(out) + 1, exit_time=3.0)
+        x, y, _, _ = on_lane(roads, out[0], 1.6, -0.3)
+        problem = replace(trial.problem, obstacles=(DiscObstacle(x, y, 0.1),))
+        script = hold(away(roads), own, *taken, frames=31)
+        return [
+            entry for entry in said(judged(replace(trial, problem=problem), script)) if entry[:2] == ("E4", 1)
+        ]
+
+    assert found(on_lane(roads, out[0], 0.9, -0.3)) == []
+    assert found(on_lane(roads, out[0], 1.1, -0.3)) == [("E4", 1, 30, 0)]
+
+
+@both
 def test_e4_a_free_exit_has_room_for_a_whole_body(roads: RoadNetwork) -> None:
     """Rectangles of 0.6 m: no other centre within 3 rho + 0.2 m of the disc, no obstacle within 2 rho + 0.2 m."""
     box, out = Car(body=Rectangle(0.6, 0.28)), lanes_out(roads)
@@ -382,7 +401,7 @@ def test_e5_of_two_that_meet_time_counts_for_who_is_on_the_left(roads: RoadNetwo
 
 
 @both
-def test_e5_the_ego_behind_who_is_left_excuses_for_a_while(roads: RoadNetwork) -> None:
+def test_e5_the_ego_near_who_is_left_excuses_for_a_while(roads: RoadNetwork) -> None:
     """The ego is beside agent 1, in the same lane state or in the other one, or left as well."""
     lane = lanes_in(roads)[0]
     length = float(roads.lengths[lane // 2])
@@ -393,10 +412,9 @@ def test_e5_the_ego_behind_who_is_left_excuses_for_a_while(roads: RoadNetwork) -
         return [entry for entry in said(judged(case(roads, 3, **SOON), script)) if entry[:2] == ("E5", 1)]
 
     behind, comes = on_lane(roads, lane, 1.2, -0.3), on_lane(roads, lane ^ 1, length - 1.2, 0.3)
-    assert found(behind, 60) == []
-    assert found(behind, 61) == [("E5", 1, 60, 0)]
-    assert found(comes, 99) == []
-    assert found(on_lane(roads, lane, 1.2, -0.1), 99) == []
+    for ego in (behind, comes, on_lane(roads, lane, 1.2, -0.1)):
+        assert found(ego, 60) == []
+        assert found(ego, 61) == [("E5", 1, 60, 0)]
 
 
 def test_e5_an_obstacle_excuses_who_may_lack_room_to_pass_it() -> None:

@@ -144,7 +144,7 @@ class JudgedCar:
     journey_spent: int = 0
     """Number of ticks of it that count, those at its start apart."""
     journey_excused: int = 0
-    """Number of ticks of it in which the ego behind it, or a full bend, was its only excuse."""
+    """Number of ticks of it in which the ego near it while left, or a full bend, was its only excuse."""
     journey_over: int = 0
     """Whether E5 has been broken in this journey."""
     last_disc: int = -1

@@ -93,8 +93,7 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
         car.been_out = 1
     paused = False
     if tables.labels.crosses[b, EGO] == v and car.been_out == 0:
-        lately = tick - ego.in_since <= terms.shared_ticks
-        paused = ego.in_since >= car.in_since and lately
+        paused = ego.in_since >= car.in_since and tick - ego.in_since <= terms.shared_ticks
     if not free and car.exit_since >= 0:
         car.exit_spent += tick - 1 - car.exit_since - car.exit_paused
     car.exit_since = run(free, tick, car.exit_since)
@@ -117,8 +116,8 @@ def _judge_exit(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> int
 def excuse_of(b: int, n: int, tick: int, tables: RefereeTables) -> tuple[bool, bool]:
     """Return whether car n of trial b, in a lane, is excused for not coming on (E5), and for as long as this is so.
 
-    Its way ahead is not free. What excuses for so long at most in a journey is the ego behind it in its lane while it
-    is left, or a bend without a free exit that is no goal.
+    Its way ahead is not free. What excuses for so long at most in a journey is the ego near it while it is left, or a
+    bend without a free exit that is no goal.
 
     Norm: docs/rules.md#way, docs/rules.md#moving-up.
     """
@@ -128,27 +127,23 @@ def excuse_of(b: int, n: int, tick: int, tables: RefereeTables) -> tuple[bool, b
     bits = np.int64(labels.bits[b, n])
     if lane < 0 or (bits & FLAG.STOPPED != 0 and bits & FIRST_AND_CLEAR != FIRST_AND_CLEAR):
         return True, True
+    if bits & FLAG.LEFT != 0:
+        return _is_by_ego(b, n, tables), False
     here = row[n].progress
     place = lane_of(roads, own, b, lane)
-    excused = lasts = False
     v = lane_end(roads, own.net, lane)
-    if bits & FLAG.LEFT != 0:
-        if _is_by_ego(b, n, tables):
-            excused = True
-            lasts = labels.lane[b, EGO] != lane or np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0
-    elif _is_narrow(b, n, place, here, tables) or _lacks_room(b, n, place, here, v, tables):
-        excused = lasts = True
+    excused = _is_narrow(b, n, place, here, tables) or _lacks_room(b, n, place, here, v, tables)
     vertex = int(roads.vert_off[own.net]) + v
     degree = roads.degree[vertex]
-    if lasts or degree >= own.crossing_degree or place.length - own.radius - here > terms.way:
-        return excused, lasts
+    if excused or degree >= own.crossing_degree or place.length - own.radius - here > terms.way:
+        return excused, True
     for k in range(tables.state.count[b]):
         if k != n and labels.crosses[b, k] == v and (k == EGO or tables.log.car[b, k].came_by == lane):
             return True, True
     vx, vy = roads.vertex[vertex].x, roads.vertex[vertex].y
     count = list_near(tables.state, b, tick, vx, vy, terms.lone, tables.spacing)
     if find_exit(b, n, v, way_back(v, lane, roads, own), count, tables):
-        return excused, lasts
+        return False, False
     return True, degree > 2 or _is_goal(b, v, tables)
 
 

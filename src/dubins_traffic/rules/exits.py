@@ -57,15 +57,6 @@ def is_exit(lane: int, only: int, back: int) -> bool:
     return lane == only if only >= 0 else lane // 2 != back
 
 
-@jit_inline
-def _passes_by(k: int, came: int, back: int) -> bool:
-    """Tell whether car k, in a bend, is an e-agent that came there by lane `came`, not by the segment `back`.
-
-    Two cars that meet in a bend, each in front of the other's exit, do not excuse each other so.
-    """
-    return k != EGO and came >= 0 and came // 2 != back
-
-
 class LaneOut(NamedTuple):
     """The lane `lane` (index) of network `net` out of a disc: `width` metres wide, a car needs `needed` metres."""
 
@@ -130,7 +121,8 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
         if taken & (1 << arm) != 0 or not is_exit(lane, only, back):
             continue
         near, far = own.radius, own.radius + terms.exit_room
-        if tables.obstacles.base[b] < 0 or not obstacle_narrows(
+        clear = lane == only or tables.obstacles.base[b] < 0
+        if clear or not obstacle_narrows(
             tables.obstacles, lane_of(t, own, b, lane), near, far, own.free_needed + GRAIN
         ):
             return True
@@ -150,9 +142,10 @@ def taken_exits(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables
     dx, dy = x - t.vertex[row].x, y - t.vertex[row].y
     away2 = dx * dx + dy * dy
     inside = tables.labels.at[b, k] == v
-    if away2 > terms.exit2 or (
-        inside and _is_bend(v, t, own) and _passes_by(k, tables.log.car[b, k].came_by, back)
-    ):
+    came = tables.log.car[b, k].came_by
+    # Two cars that meet in a bend, each in front of the other's exit, do not excuse each other so.
+    passes_by = inside and _is_bend(v, t, own) and came >= 0 and came // 2 != back
+    if away2 > terms.exit2 or (passes_by and k != EGO):
         return 0
     taken = 0
     for arm in range(t.degree[row]):
@@ -162,6 +155,10 @@ def taken_exits(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables
             from_x, from_y = lane_coordinates(t, net, lane, state.x[b, n], state.y[b, n])
             way = to_mouth(from_x, from_y, own, terms)
             in_the_way = to_mouth(along, lateral, own, terms) < way + GRAIN
+            if in_the_way and passes_by:
+                tx, ty = lane_direction_at(t, net, lane, x, y)
+                half, needed = half_across(b, k, tx, ty, state, own), own.free_needed + GRAIN
+                in_the_way = narrows(lateral - half, lateral + half, own.lane_width, needed)
         else:
             out = LaneOut(net, lane, own.lane_width, own.free_needed)
             in_the_way = takes_lane(b, k, out, own, state, tables.labels, t)

@@ -115,7 +115,8 @@ class RuleParameters:
     way_distance: float = 1.5
     """E5: the way is free if nothing narrows the lane within this distance, and no full bend is within it."""
     rest_time: float = 60.0
-    """E5: what a journey may take, beside the time for its way; so long of it a full bend or the ego behind excuses."""
+    """E5: what a journey may take, beside the time for its way; so long of it a full bend excuses, or, who is left, the
+    ego near it."""
     journey_lengths: float = 4.0
     """E5: the time for its way is that in which a car at top speed drives so many times the longest segment."""
     journey_start_time: float = 20.0
