@@ -178,6 +178,19 @@ def ego_by_obstacle(number: int) -> Made:
     return _provoked(stage, lane, place, drivers.AsEgo(drivers.Swings(), back=back))
 
 
+def ego_faces(number: int) -> Made:
+    """The ego drives up to who passes an obstacle on the left, and stands before it; a queue may be behind that."""
+    stage = Stage(number, ELBOW if number % 3 else None)
+    lane = stage.dice.randrange(stage.network.lanes)
+    length = stage.length(lane)
+    s = stage.dice.uniform(RADIUS + 1.0, length - RADIUS - 0.4)
+    stage.block(lane, s, stage.dice.uniform(-0.4, -0.2), stage.dice.uniform(0.08, 0.2))
+    ego = stage.pose(lane ^ 1, max(0.2, length - s - stage.dice.uniform(0.8, 2.5)))
+    own = {"near": stage.dice.uniform(0.8, 3.0), "gap": stage.dice.uniform(0.02, 0.9)}
+    inner = drivers.AsEgo(drivers.Faces(), **own, speed=0.7, minds=True)
+    return _provoked(stage, lane, ego, Shield(inner), stage.dice.choice((2, 3, 4, 5)))
+
+
 def ego_beyond_obstacle(number: int) -> Made:
     """The ego stands before the disc toward which others pass an obstacle that is near to it."""
     stage = Stage(number, (ELBOW, None)[number // 3 % 2])
@@ -216,7 +229,8 @@ PROVOKING: Final[Mapping[str, Scene]] = {
     own.__name__: own
     for own in (
         ego_beyond_exit, ego_beyond_crossing, ego_closes, ego_closes_crossing, ego_tilted, ego_beside_line, ego_slow,
-        ego_swings, ego_at_edge, ego_in_bend, ego_presses, ego_by_obstacle, ego_beyond_obstacle, ego_holds, ego_whims,
+        ego_swings, ego_at_edge, ego_in_bend, ego_presses, ego_by_obstacle, ego_faces,
+        ego_beyond_obstacle, ego_holds, ego_whims,
     )
 }  # fmt: skip
 UNCLAIMED: Final[Mapping[str, Scene]] = {"ego_presses_boxes": ego_presses_boxes}

@@ -151,7 +151,8 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     while j >= 0:
         key = along(way, float(state.x[b, j]), float(state.y[b, j]))
         left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
-        stands = labels.bits[b, j] & FLAG.STANDS != 0
+        # An ego that stands may set off and bar the way back, which excuses nobody for long (E5).
+        stands = labels.bits[b, j] & FLAG.STANDS != 0 and (n == EGO or j != EGO or key <= own)
         passes = labels.bits[b, j] & FLAG.LEFT != 0 and not stands
         if j != n and key > own - (OVERTAKEN if passes else 0.5):
             before = key > own or left > vehicle.middle

@@ -32,7 +32,7 @@ from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import PASSING_WAIT, find_way_past, keep_off
 from dubins_traffic.policies.rules.path_cache import way_of
 from dubins_traffic.policies.rules.returning import keep_passing
-from dubins_traffic.policies.rules.right_of_way import before_ego, yield_at_line
+from dubins_traffic.policies.rules.right_of_way import before_ego, kept_out_for_long, yield_at_line
 from dubins_traffic.policies.rules.room import is_pressed
 from dubins_traffic.policies.rules.seeing import (
     QUEUE_GAP,
@@ -214,7 +214,7 @@ def follow(
     if car.keeps > 0.0 and who >= 0 and keeps_own_gap(b, n, who, labels, car):
         kept = car.keeps
     if kept > QUEUE_GAP and not rides and who != -1:
-        turn = part == PART.BEFORE and car.turn > 0
+        turn = part == PART.BEFORE and (car.turn > 0 or kept_out_for_long(car, vehicle))
         if turn or is_pressed(b, n, traffic):
             kept = QUEUE_GAP
     ahead = max(0.0, state.speed[b, who]) if rides else 0.0

@@ -97,7 +97,7 @@ def may_enter_bend(
     hushed = is_hushed(tick, v, car, vehicle, drivers)
     inside = 0
     held = False
-    long = car.kind != KIND.ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
+    long = kept_out_for_long(car, vehicle)
     for k in range(near):
         j = scratch.near[k]
         if labels.crosses[b, j] == v:
@@ -114,8 +114,14 @@ def may_enter_bend(
             free = free or is_free(b, n, car.next_lane, traffic) or moves_up(b, n, v, degree, traffic)
     if long and not free and turns and degree == 2:
         take_way_on(b, n, False, traffic)
-    car.kept_out = 0 if free else car.kept_out + 1
+    car.kept_out = 0 if free and not long else car.kept_out + 1
     return free
+
+
+@jit_inline
+def kept_out_for_long(car: Driver, vehicle: Vehicle) -> bool:
+    """Tell whether an e-agent has stood before a bend or dead end for so long that E5 may ask it to come on."""
+    return car.kind != KIND.ROUND and car.kept_out * vehicle.period > PATIENT * vehicle.rest_time
 
 
 @jit_rare
