@@ -278,6 +278,11 @@ def test_scripted_plays_exactly() -> None:
         assert played == expected
 
 
+def test_scripted_holds_a_command_for_as_long_as_a_float_can_say() -> None:
+    given = {"commands": [[1.7e308, 0.1, 0.2], [1.7e308, 0.3, 0.0]]}
+    assert first_commands(instance([("scripted", given)], [AWAY, in_lane(GRID, 0)])) == [(0.1, 0.2)]
+
+
 def test_scripted_without_commands_stands() -> None:
     for given in ({"commands": []}, {"commands": [[0.0, 1.0, 1.0]], "repeat": True}):
         assert first_commands(instance([("scripted", given)], [AWAY, in_lane(GRID, 0)])) == [(0.0, 0.0)]
