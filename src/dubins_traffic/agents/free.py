@@ -389,7 +389,7 @@ def _describe(instance: Instance, agent: EAgent, car: FreeCar, whims: list[tuple
     time = 0.0
     for seconds, *rest in rows:
         time += seconds
-        whims.append((float(math.ceil(min(time * rate, 1e300) - 1e-9)), *rest))
+        whims.append((float(math.ceil(min(time * rate, 1e15) - 1e-9)), *rest))
     car.last = len(whims)
 
 

@@ -33,11 +33,11 @@ def play(tick: int, agent: Agent, script: Rows[Stretch]) -> tuple[float, float]:
 def script_rows(commands: Sequence[Sequence[float]], rate: float) -> list[tuple[float, float, float]]:
     """Return (tick at which it ends, speed, yaw rate) of commands given as [seconds, speed, yaw rate].
 
-    A time t, counted from the beginning of the script, is reached with tick ceil(t * rate - 1e-9), 1e300 at most.
+    A time t, counted from the beginning of the script, is reached with tick ceil(t * rate - 1e-9), 1e15 at most.
     """
     rows: list[tuple[float, float, float]] = []
     time = 0.0
     for seconds, speed, yaw_rate in commands:
         time += seconds
-        rows.append((float(math.ceil(min(time * rate, 1e300) - 1e-9)), float(speed), float(yaw_rate)))
+        rows.append((float(math.ceil(min(time * rate, 1e15) - 1e-9)), float(speed), float(yaw_rate)))
     return rows
