@@ -174,7 +174,7 @@ class Judge:
                 return False
         radius, gap = self.problem.intersection_radius, self.rules.exit_gap
         end = radius + max(gap, 2 * self.problem.car.body.reach + gap / 4)
-        for obstacle in self.problem.obstacles if self.gone(k, n, v) != arm else ():
+        for obstacle in self.problem.obstacles:
             reach = self.reference.obstacle_range(arm, obstacle, radius, end)
             if reach is not None and self.reference.narrows(*reach):
                 self.fired["narrow exit"] += 1

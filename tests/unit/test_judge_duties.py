@@ -132,25 +132,6 @@ def test_e4_no_exit_is_free_with_somebody_near_in_each(roads: RoadNetwork) -> No
 
 
 @both
-def test_e4_an_obstacle_takes_nothing_of_a_lane_on_which_the_centre_is_already(roads: RoadNetwork) -> None:
-    """All other exits are taken; the body meets the disc, and the centre is in it, or just out of it."""
-    out = lanes_out(roads)
-    taken = [after(roads, lane, 0.4) for lane in out[1:]]
-
-    def found(own: tuple[float, ...]) -> list[tuple[object, ...]]:
-        trial = case(roads, len(out) + 1, exit_time=3.0)
-        x, y, _, _ = on_lane(roads, out[0], 1.6, -0.3)
-        problem = replace(trial.problem, obstacles=(DiscObstacle(x, y, 0.1),))
-        script = hold(away(roads), own, *taken, frames=31)
-        return [
-            entry for entry in said(judged(replace(trial, problem=problem), script)) if entry[:2] == ("E4", 1)
-        ]
-
-    assert found(on_lane(roads, out[0], 0.9, -0.3)) == []
-    assert found(on_lane(roads, out[0], 1.1, -0.3)) == [("E4", 1, 30, 0)]
-
-
-@both
 def test_e4_a_free_exit_has_room_for_a_whole_body(roads: RoadNetwork) -> None:
     """Rectangles of 0.6 m: no other centre within 3 rho + 0.2 m of the disc, no obstacle within 2 rho + 0.2 m."""
     box, out = Car(body=Rectangle(0.6, 0.28)), lanes_out(roads)

@@ -121,8 +121,7 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
         if taken & (1 << arm) != 0 or not is_exit(lane, only, back):
             continue
         near, far = own.radius, own.radius + terms.exit_room
-        clear = lane == only or tables.obstacles.base[b] < 0
-        if clear or not obstacle_narrows(
+        if tables.obstacles.base[b] < 0 or not obstacle_narrows(
             tables.obstacles, lane_of(t, own, b, lane), near, far, own.free_needed + GRAIN
         ):
             return True
