@@ -7,8 +7,6 @@ from collections.abc import Mapping, Sequence
 from random import Random
 from typing import Any, ClassVar
 
-import numpy as np
-
 from dubins_traffic.cars.state import Command, Observation, Pose
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.problem.instance import Instance, Problem
@@ -47,6 +45,21 @@ class Driver:
         assert self.start is not None
         x, y = seen.pose.x - self.start.x, seen.pose.y - self.start.y
         return x * self.start.c + y * self.start.s
+
+    def turn_to(self, seen: Observation, x: float, y: float) -> float:
+        """Return how far left of its heading a place is that lies `x`, `y` metres from it, radians."""
+        return math.atan2(y * seen.pose.c - x * seen.pose.s, x * seen.pose.c + y * seen.pose.s)
+
+    def spin(self, turn: float) -> tuple[float, float]:
+        """Return speed and yaw rate of turning on the spot by so many radians, as far as a tick allows."""
+        most = self.problem.car.bounds.yaw_rate
+        return 0.0, max(-most, min(most, turn * self.problem.rate))
+
+    def bend_at(self, pose: Pose, beyond: float = 0.0) -> int:
+        """Return the bend in whose disc a place is, or at most `beyond` metres from it, -1 for none."""
+        nearest, far = self.problem.network.nearest_intersection(pose[:2])
+        inside = float(far) < self.problem.intersection_radius + beyond
+        return int(nearest) if inside and self.problem.network.degrees[nearest] == 2 else -1
 
     def speed_to(self, far: float) -> float:
         """Return the speed that goes as far in a tick, m/s."""
@@ -124,10 +137,9 @@ class Tours(Driver):
             if seen.time >= self.until:
                 self.next, self.until = (self.next + 1) % len(points), -1.0
             return 0.0, 0.0
-        turn = math.atan2(dy * seen.pose.c - dx * seen.pose.s, dx * seen.pose.c + dy * seen.pose.s)
+        turn = self.turn_to(seen, dx, dy)
         if abs(turn) > 0.02:
-            most = self.problem.car.bounds.yaw_rate
-            return 0.0, max(-most, min(most, turn * self.problem.rate))
+            return self.spin(turn)
         if not self.own["rude"] and self._is_barred(seen):
             return 0.0, 0.0
         return min(self.own["speed"], self.speed_to(far)), 0.0
@@ -147,12 +159,8 @@ class Presses(Driver):
     parameters: ClassVar = {"side": 2.0, "gap": 0.02}
 
     def drive(self, seen: Observation) -> tuple[float, float]:
-        network, found = self.problem.network, []
-        for other in seen.others:
-            far = np.hypot(*(network.points - (other.pose.x, other.pose.y)).T)
-            bend = int(far.argmin())
-            if network.degrees[bend] == 2 and far[bend] < self.problem.intersection_radius:
-                found.append((math.dist(other.pose[:2], seen.pose[:2]), other.pose))
+        poses = [other.pose for other in seen.others if self.bend_at(other.pose) >= 0]
+        found = [(math.dist(pose[:2], seen.pose[:2]), pose) for pose in poses]
         if not found:
             return 0.0, 0.0
         far, its = min(found)
@@ -161,10 +169,9 @@ class Presses(Driver):
         x, y = its.x + away * math.cos(angle) - seen.pose.x, its.y + away * math.sin(angle) - seen.pose.y
         if far > 2.5 or math.hypot(x, y) < 0.01:
             return 0.0, 0.0
-        turn = math.atan2(y * seen.pose.c - x * seen.pose.s, x * seen.pose.c + y * seen.pose.s)
-        most = self.problem.car.bounds
+        turn = self.turn_to(seen, x, y)
         if abs(turn) > 0.2:
-            return 0.0, max(-most.yaw_rate, min(most.yaw_rate, turn * self.problem.rate))
+            return self.spin(turn)
         return self.speed_to(math.hypot(x, y)), turn
 
 
@@ -253,26 +260,20 @@ class Bars(Lawful):
 
     def _bend(self, pose: Pose) -> int:
         """Return the bend that a body at a pose meets and that is no goal, -1 for none."""
-        network, problem = self.problem.network, self.problem
-        far = np.hypot(*(network.points - (pose.x, pose.y)).T)
-        bend = int(far.argmin())
-        is_one = network.degrees[bend] == 2 and bend not in problem.goal_vertices
-        return bend if is_one and far[bend] < problem.intersection_radius + problem.car.body.reach else -1
+        bend = self.bend_at(pose, self.problem.car.body.reach)
+        return -1 if bend in self.problem.goal_vertices else bend
 
     def _before(self, seen: Observation, ego: Pose, bend: int) -> tuple[float, float]:
         """Drive toward where the ego will be, and stand as soon as that is close."""
         x, y = ego.x + self.NEARLY * ego.c - seen.pose.x, ego.y + self.NEARLY * ego.s - seen.pose.y
-        most = self.problem.car.bounds
-        reach = 2.0 * self.problem.car.body.reach + 3.0 * most.speed / self.problem.rate
+        reach = 2.0 * self.problem.car.body.reach + 3.0 * self.problem.car.bounds.speed / self.problem.rate
         close = math.hypot(ego.x - seen.pose.x, ego.y - seen.pose.y) < reach
         there = self.problem.network.points[bend]
         inside = math.dist((seen.pose.x, seen.pose.y), there) < 0.9 * self.problem.intersection_radius
         if close or not inside or math.hypot(x, y) < SLACK:
             return 0.0, 0.0
-        turn = math.atan2(y * seen.pose.c - x * seen.pose.s, x * seen.pose.c + y * seen.pose.s)
-        if abs(turn) > 0.2:
-            return 0.0, max(-most.yaw_rate, min(most.yaw_rate, turn * self.problem.rate))
-        return self.own["speed"], turn
+        turn = self.turn_to(seen, x, y)
+        return self.spin(turn) if abs(turn) > 0.2 else (self.own["speed"], turn)
 
 
 class Whims(Lawful):

@@ -30,7 +30,7 @@ QUICK = {
 }  # fmt: skip
 
 CLAUSES = {
-    "lingers", "nearer", "passes by", "narrow exit", "narrowed exit", "comes beside", "way back", "same tick",
+    "lingers", "nearer", "passes by", "narrow exit", "narrowed exit", "comes beside", "way back", "same tick", "later",
     "ego in the bend", "one in the bend", "E6 waits", "full bend", "stopped again", "E4 paused", "E4 added up",
     "left by the ego", "out before the ego", "gone out", "alone at an obstacle",
     "not alone at an obstacle", "E5 excused for long", "E6 paused", "E3.enter", "E3.tickets", "E4", "E5", "E6",

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from dubins_traffic.agents.lawful import drivers_of
+from dubins_traffic.agents.script import script_rows
 from dubins_traffic.cars.body import Disc
 from dubins_traffic.cars.state import EGO, Labels, State
 from dubins_traffic.cars.tables import pack_obstacles
@@ -386,10 +387,7 @@ def _describe(instance: Instance, agent: EAgent, car: FreeCar, whims: list[tuple
         for seconds, speed, yaw_rate in given["commands"]
     ]
     car.first = car.place = len(whims)
-    time = 0.0
-    for seconds, *rest in rows:
-        time += seconds
-        whims.append((float(math.ceil(min(time * rate, 1e15) - 1e-9)), *rest))
+    whims += script_rows(rows, rate)
     car.last = len(whims)
 
 

@@ -69,7 +69,7 @@ class Lists:
     """What the cars of a batch drive along, one car's rows after another's: lanes of cycles, steps of scripts."""
 
     cycle: list[int] = field(default_factory=list[int])
-    script: list[tuple[float, float, float]] = field(default_factory=list[tuple[float, float, float]])
+    script: list[tuple[float, ...]] = field(default_factory=list[tuple[float, ...]])
 
 
 Parameters: TypeAlias = Mapping[str, Any]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import accumulate
 
 from dubins_traffic.agents.tables import Agent, Stretch
 from dubins_traffic.kernels.compile import jit
@@ -30,14 +31,11 @@ def play(tick: int, agent: Agent, script: Rows[Stretch]) -> tuple[float, float]:
     return script[row].speed, script[row].yaw_rate
 
 
-def script_rows(commands: Sequence[Sequence[float]], rate: float) -> list[tuple[float, float, float]]:
-    """Return (tick at which it ends, speed, yaw rate) of commands given as [seconds, speed, yaw rate].
+def script_rows(commands: Sequence[Sequence[float]], rate: float) -> list[tuple[float, ...]]:
+    """Return (tick at which it ends, *values) of commands given as [seconds, *values], of a speed and a yaw rate, say.
 
     A time t, counted from the beginning of the script, is reached with tick ceil(t * rate - 1e-9), 1e15 at most.
     """
-    rows: list[tuple[float, float, float]] = []
-    time = 0.0
-    for seconds, speed, yaw_rate in commands:
-        time += seconds
-        rows.append((float(math.ceil(min(time * rate, 1e15) - 1e-9)), float(speed), float(yaw_rate)))
-    return rows
+    times = accumulate(command[0] for command in commands)
+    ends = [float(math.ceil(min(time * rate, 1e15) - 1e-9)) for time in times]
+    return [(end, *map(float, command[1:])) for end, command in zip(ends, commands, strict=True)]

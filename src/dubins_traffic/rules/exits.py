@@ -66,6 +66,16 @@ class LaneOut(NamedTuple):
     needed: float
 
 
+@jit_inline
+def _narrows_lane(
+    b: int, k: int, out: LaneOut, lateral: float, body: Shape, state: State, roads: RoadTable
+) -> bool:
+    """Tell whether the body of car `k` (index), `lateral` (m) left of a lane's centre line, narrows the lane `out`."""
+    tx, ty = lane_direction_at(roads, out.net, out.lane, state.x[b, k], state.y[b, k])
+    half = half_across(b, k, tx, ty, state, body)
+    return narrows(lateral - half, lateral + half, out.width, out.needed + GRAIN)
+
+
 @jit
 def takes_lane(
     b: int, k: int, out: LaneOut, body: Shape, state: State, labels: Labels, roads: RoadTable
@@ -79,15 +89,12 @@ def takes_lane(
     """
     if labels.segment[b, k] != out.lane // 2:
         return False
-    x, y = state.x[b, k], state.y[b, k]
-    along, lateral = lane_coordinates(roads, out.net, out.lane, x, y)
+    along, lateral = lane_coordinates(roads, out.net, out.lane, state.x[b, k], state.y[b, k])
     if along <= 0.0:
         return False
     if labels.lane[b, k] != out.lane ^ 1 and -out.width - GRAIN <= lateral <= GRAIN:
         return True
-    tx, ty = lane_direction_at(roads, out.net, out.lane, x, y)
-    half = half_across(b, k, tx, ty, state, body)
-    return narrows(lateral - half, lateral + half, out.width, out.needed + GRAIN)
+    return _narrows_lane(b, k, out, lateral, body, state, roads)
 
 
 @jit_inline
@@ -149,17 +156,15 @@ def taken_exits(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables
     taken = 0
     for arm in range(t.degree[row]):
         lane = t.arms[row, arm]
+        out = LaneOut(net, lane, own.lane_width, own.free_needed)
         if inside:
             along, lateral = lane_coordinates(t, net, lane, x, y)
             from_x, from_y = lane_coordinates(t, net, lane, state.x[b, n], state.y[b, n])
             way = to_mouth(from_x, from_y, own, terms)
             in_the_way = to_mouth(along, lateral, own, terms) < way + GRAIN
             if in_the_way and passes_by:
-                tx, ty = lane_direction_at(t, net, lane, x, y)
-                half, needed = half_across(b, k, tx, ty, state, own), own.free_needed + GRAIN
-                in_the_way = narrows(lateral - half, lateral + half, own.lane_width, needed)
+                in_the_way = _narrows_lane(b, k, out, lateral, own, state, t)
         else:
-            out = LaneOut(net, lane, own.lane_width, own.free_needed)
             in_the_way = takes_lane(b, k, out, own, state, tables.labels, t)
         if in_the_way:
             taken |= 1 << arm
