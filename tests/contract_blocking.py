@@ -104,6 +104,17 @@ def before_obstacle(number: int) -> Made:
     return _blocked(stage, lane, [("Swings", {"back": back}, place)])
 
 
+def out_before_obstacle(number: int) -> Made:
+    """A car stands with its centre just out of a crossing, on a lane that an obstacle narrows."""
+    stage = Stage(number, TEE)
+    lane = stage.lane_into(3) ^ 1
+    out = RADIUS + stage.dice.uniform(0.01, 0.9) * stage.reach
+    radius = stage.dice.uniform(0.1, 0.15)
+    stage.block(lane, out + 1.05 * stage.reach + radius, radius=radius)
+    back = stage.dice.choice((0.0, 0.05))
+    return _blocked(stage, lane, [("Swings", {"back": back}, stage.pose(lane, out))])
+
+
 def head_on(number: int) -> Made:
     """A car on the left beside an obstacle, and one that comes toward it, stand before each other."""
     stage, lane = _any_stage(number)
@@ -258,8 +269,8 @@ def _anywhere(stage: Stage, lane: int, others: Sequence[Pose]) -> Pose:
 BLOCKING: Final[Mapping[str, Scene]] = {
     own.__name__: own
     for own in (
-        passed, abreast, disc_edge_out, disc_edge_in, both_edges, beside_obstacle, before_obstacle, head_on,
-        face_to_face, before_queue, shuttle, ring, crawler, spinner, in_a_disc, in_the_way, over_the_line, holder,
-        any_pair, any_tour,
+        passed, abreast, disc_edge_out, disc_edge_in, both_edges, beside_obstacle, before_obstacle,
+        out_before_obstacle, head_on, face_to_face, before_queue, shuttle, ring, crawler, spinner, in_a_disc,
+        in_the_way, over_the_line, holder, any_pair, any_tour,
     )
 }  # fmt: skip

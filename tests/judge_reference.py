@@ -121,9 +121,13 @@ class Judge:
         return [self.gone(k, n, v)] if self.gone(k, n, v) else self.exits(v, self.came_by(k, n))
 
     def gone(self, k: int, n: int, v: int) -> tuple[int, int] | None:
-        """The lane out of v on which the centre of a car is, outside the disc, if it is on one."""
+        """The lane out of v on which the centre of a car is, outside the disc, if it is on one that is not barred."""
         lane = divmod(self.past[k][n]["lane"], 2)
-        return lane if self.past[k][n]["lane"] >= 0 and lane in self.arms(v) else None
+        if self.past[k][n]["lane"] < 0 or lane not in self.arms(v):
+            return None
+        barred = self.barred(lane)
+        self.fired["out before an obstacle"] += barred
+        return None if barred else lane
 
     def bend(self, v: int) -> bool:
         return len(self.arms(v)) >= 2 and not self.reference.crossing(v)
@@ -172,14 +176,19 @@ class Judge:
                 return False
             if self.takes(k, other, v, arm):
                 return False
+        barred = self.barred(arm)
+        self.fired["narrow exit"] += barred
+        return not barred
+
+    def barred(self, arm: tuple[int, int]) -> bool:
+        """Whether an obstacle narrows a lane out of a disc, next to that."""
         radius, gap = self.problem.intersection_radius, self.rules.exit_gap
         end = radius + max(gap, 2 * self.problem.car.body.reach + gap / 4)
         for obstacle in self.problem.obstacles:
             reach = self.reference.obstacle_range(arm, obstacle, radius, end)
             if reach is not None and self.reference.narrows(*reach):
-                self.fired["narrow exit"] += 1
-                return False
-        return True
+                return True
+        return False
 
     def may_leave(self, k: int, n: int) -> bool:
         """E4: whether some exit is free of the disc that the body meets."""

@@ -32,7 +32,7 @@ QUICK = {
 CLAUSES = {
     "lingers", "nearer", "passes by", "narrow exit", "narrowed exit", "comes beside", "way back", "same tick", "later",
     "ego in the bend", "one in the bend", "E6 waits", "full bend", "stopped again", "E4 paused", "E4 added up",
-    "left by the ego", "out before the ego", "gone out", "alone at an obstacle",
+    "left by the ego", "out before the ego", "gone out", "out before an obstacle", "alone at an obstacle",
     "not alone at an obstacle", "E5 excused for long", "E6 paused", "E3.enter", "E3.tickets", "E4", "E5", "E6",
 }  # fmt: skip
 """What is to happen in some trial: rules broken, and clauses by which no rule is or time does not count."""

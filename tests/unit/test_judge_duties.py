@@ -132,6 +132,26 @@ def test_e4_no_exit_is_free_with_somebody_near_in_each(roads: RoadNetwork) -> No
 
 
 @both
+def test_e4_who_is_out_on_a_lane_that_an_obstacle_narrows_has_the_other_exits(roads: RoadNetwork) -> None:
+    """The body meets the disc, and its centre is just out of it; a car takes each other exit, or is far from it."""
+    out = lanes_out(roads)
+
+    def found(gap: float, lateral: float) -> list[tuple[object, ...]]:
+        trial = case(roads, len(out) + 1, exit_time=3.0)
+        x, y, _, _ = on_lane(roads, out[0], 1.6, lateral)
+        problem = replace(trial.problem, obstacles=(DiscObstacle(x, y, 0.1),))
+        own, taken = on_lane(roads, out[0], 1.1, -0.3), [after(roads, lane, gap) for lane in out[1:]]
+        script = hold(away(roads), own, *taken, frames=31)
+        return [
+            entry for entry in said(judged(replace(trial, problem=problem), script)) if entry[:2] == ("E4", 1)
+        ]
+
+    late = [("E4", 1, 30, 0)]
+    assert (found(1.2, -0.3), found(0.4, -0.3)) == (late, [])
+    assert (found(1.2, -0.8), found(0.4, -0.8)) == (late, late)
+
+
+@both
 def test_e4_a_free_exit_has_room_for_a_whole_body(roads: RoadNetwork) -> None:
     """Rectangles of 0.6 m: no other centre within 3 rho + 0.2 m of the disc, no obstacle within 2 rho + 0.2 m."""
     box, out = Car(body=Rectangle(0.6, 0.28)), lanes_out(roads)

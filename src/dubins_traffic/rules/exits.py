@@ -38,14 +38,22 @@ def way_back(v: int, came: int, t: RoadTable, own: TrialRules) -> int:
 def lane_taken(b: int, n: int, v: int, tables: RefereeTables) -> int:
     """Return the lane out of v that is car n's lane state while its centre is outside the disc, else -1.
 
-    That lane is then its only exit.
+    That lane is then its only exit, unless an obstacle narrows it.
 
     Norm: docs/rules.md#out.
     """
     lane = int(tables.labels.lane[b, n])
     if lane < 0 or lane_start(tables.roads, tables.rules[b].net, lane) != v:
         return -1
-    return lane
+    return -1 if _is_barred(b, lane, tables) else lane
+
+
+@jit_inline
+def _is_barred(b: int, lane: int, tables: RefereeTables) -> bool:
+    """Tell whether an obstacle narrows a lane next to the disc at its beginning."""
+    own, place = tables.rules[b], lane_of(tables.roads, tables.rules[b], b, lane)
+    near, far = own.radius, own.radius + tables.terms[b].exit_room
+    return obstacle_narrows(tables.obstacles, place, near, far, own.free_needed + GRAIN)
 
 
 @jit_inline
@@ -115,8 +123,8 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
 
     Norm: docs/rules.md#free-exit.
     """
-    t, own, terms = tables.roads, tables.rules[b], tables.terms[b]
-    row = int(t.vert_off[own.net]) + v
+    t = tables.roads
+    row = int(t.vert_off[tables.rules[b].net]) + v
     only = lane_taken(b, n, v, tables)
     taken = 0
     for i in range(count):
@@ -125,12 +133,7 @@ def find_exit(b: int, n: int, v: int, back: int, count: int, tables: RefereeTabl
             taken |= taken_exits(b, n, k, v, back, tables)
     for arm in range(t.degree[row]):
         lane: int = t.arms[row, arm]
-        if taken & (1 << arm) != 0 or not is_exit(lane, only, back):
-            continue
-        near, far = own.radius, own.radius + terms.exit_room
-        if tables.obstacles.base[b] < 0 or not obstacle_narrows(
-            tables.obstacles, lane_of(t, own, b, lane), near, far, own.free_needed + GRAIN
-        ):
+        if taken & (1 << arm) == 0 and is_exit(lane, only, back) and not _is_barred(b, lane, tables):
             return True
     return False
 
@@ -179,12 +182,10 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
     near it with its centre outside is in the way of one exit at most: so while fewer cars are near than there are
     lanes, and none has its centre in the disc, an exit is free until another car can have come near or into the disc.
     """
-    state, t, spacing, own, terms = (
-        tables.state, tables.roads, tables.spacing, tables.rules[b], tables.terms[b],
-    )  # fmt: skip
+    state, t, spacing, own = tables.state, tables.roads, tables.spacing, tables.rules[b]
+    far2, lone = tables.terms[b].exit2, tables.terms[b].lone
     row = int(t.vert_off[own.net]) + v
     vx, vy = t.vertex[row].x, t.vertex[row].y
-    far2, lone = terms.exit2, terms.lone
     near = inside = 0
     nearest2 = beyond2 = lone * lone
     count = list_near(state, b, tick, vx, vy, lone, spacing)

@@ -55,8 +55,7 @@ def room_in(b: int, n: int, out: int, inside: int, traffic: Traffic) -> float:
     state, labels, roads, drivers, scratch = (
         traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
     )  # fmt: skip
-    net = drivers.net[b]
-    vehicle = drivers.vehicle[b]
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
     mouth, pitch = queue_lengths(vehicle)
     start = lane_start(roads, net, out)
     end = lane_end(roads, net, out)
@@ -127,8 +126,7 @@ def is_open(b: int, n: int, out: int, traffic: Traffic) -> bool:
     state, labels, roads, drivers, scratch = (
         traffic.state, traffic.labels, traffic.roads, traffic.drivers, traffic.scratch,
     )  # fmt: skip
-    net = drivers.net[b]
-    vehicle = drivers.vehicle[b]
+    net, vehicle = drivers.net[b], drivers.vehicle[b]
     mouth, pitch = queue_lengths(vehicle)
     start = lane_start(roads, net, out)
     tx, ty = lane_direction(roads, net, out)
