@@ -28,6 +28,8 @@ if TYPE_CHECKING:
 
 QUARTERS: Final = 5
 """Poses of a tick that are looked at."""
+EXTENT = z3.Function("extent", z3.RealSort(), z3.RealSort(), z3.RealSort())
+"""Half the extent of the other body across a direction, given by its two components, metres."""
 
 
 class Meeting:
@@ -91,7 +93,7 @@ def instead(meeting: Meeting, **more: Any) -> Iterator[None]:
     """Let `policies.safety` call terms, and what `more` names."""
     names: dict[str, Any] = {
         "advance": meeting.advance, "separation": meeting.separation, "min": least, "max": greatest,
-        "half_extent": lambda *_: Real("extent"), "moved_by": lambda *_: meeting.own,
+        "half_extent": lambda tx, ty, *_: Real(EXTENT(tx.term, ty.term)), "moved_by": lambda *_: meeting.own,
     }  # fmt: skip
     with replaced(safety, names | more):
         yield
@@ -198,8 +200,8 @@ def a_rectangle_leads_away() -> int:
             count += 1
             way = 1 if through.may(real_of(own.command.speed) > 0) else -1
             x, y, c, s = (value.term for value in own.poses[0])
-            ahead = way * ((own.other.x.term - x) * c + (own.other.y.term - y) * s) + z3.Real("extent")
-            reached = ahead + own.travel.term * u
+            ahead = way * ((own.other.x.term - x) * c + (own.other.y.term - y) * s)
+            reached = ahead + EXTENT(-s, c) + own.travel.term * u
             rear = -own.car.half_length.term + own.own.term * u
             if through.may(clear.term, own.own.term > 0, u > 0, rear <= reached):
                 raise RefutedError("a rectangle that leads away is reached")

@@ -42,7 +42,7 @@ class Drive:
         """Speeds straight on, and whether they are safe but for cars that are slid past."""
         vehicle = SimpleNamespace(
             yaw_most=Real("yaw_most"), tightest=Real("tightest"), half_length=0.0 if disc else Real("half_length"),
-            period=Real("period"),
+            period=Real("period"), slowest=Real("slowest"),
         )  # fmt: skip
         self.disc = disc
         self.premises = [vehicle.tightest.term >= 0, *([] if disc else [vehicle.half_length.term > 0])]

@@ -16,12 +16,12 @@ from hypothesis import strategies as st
 from dubins_traffic.cars.body import Bounds, Car, Rectangle
 from dubins_traffic.cars.state import Command, Observation, Pose, Propositions, Twist
 from dubins_traffic.controllers.lanes import Lanes
-from dubins_traffic.kernels.boxes import NEVER, Box, Drive, box_contact, separation
+from dubins_traffic.kernels.boxes import NEVER, Box, Drive, box_contact, driven, separation
 from dubins_traffic.kernels.records import table
 from dubins_traffic.kernels.trig import advance, sincos
 from dubins_traffic.policies.lanes.turns import IMPOSSIBLE, VISIT, Site, along, shape
 from dubins_traffic.policies.rules.tables import Vehicle
-from dubins_traffic.policies.safety import motion_is_safe
+from dubins_traffic.policies.safety import motion_is_safe, slides_on
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.routing.rounds import round_time
@@ -182,6 +182,32 @@ def test_a_safe_motion_meets_nobody_or_leads_away(
     if met < NEVER:
         stands = box_contact(body, Drive(*own, 1.0), beside, Drive(0.0, 0.0, 0.0), 0.0, 1 / 30)
         assert stands == NEVER
+
+
+@PLAIN
+@given(
+    other=st.tuples(st.floats(-0.7, 0.7), st.floats(-0.5, 0.5), st.floats(-3.2, 3.2)),
+    speed=st.sampled_from((-0.7, -0.2, 0.2, 0.7)),
+    its=st.tuples(st.floats(-0.7, 0.7), st.floats(-3.1, 3.1)),
+    rate=st.sampled_from((10.0, 30.0)),
+)
+def test_a_rectangle_that_slides_past_another_closes_in_on_it_in_no_contact(
+    other: tuple[float, float, float], speed: float, its: tuple[float, float], rate: float
+) -> None:
+    a, h, period, way = 0.31, 0.14, 1.0 / rate, math.copysign(1.0, speed)
+    car = table(Vehicle, 1)[0]
+    car.half_length, car.half_width, car.reach, car.period = a, h, math.hypot(a, h), period
+    car.fastest, car.slowest, car.yaw_most = 0.7, -0.7, 3.15
+    c, s = sincos(other[2])
+    body, beside = Box(0.0, 0.0, 1.0, 0.0, a, h, 0.0), Box(other[0], other[1], c, s, a, h, 0.0)
+    assume(separation(body, beside)[0] > 0.003)
+    assume(slides_on(Pose(0.0, 0.0, way, 0.0), car, Pose(other[0], other[1], c, s)))
+    own, drives = Drive(speed, 0.0, period), Drive(*its, period)
+    met = box_contact(body, own, beside, drives, 0.0, period)
+    if met < NEVER:
+        before = max(met - 1e-7, 0.0)
+        _, nx, _, _, _ = separation(driven(body, own, before), driven(beside, drives, before))
+        assert speed * nx < 1e-6
 
 
 def drive(controller: Lanes, car: Car, pose: tuple[float, float, float, float], ticks: int) -> np.ndarray:

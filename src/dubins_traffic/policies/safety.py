@@ -113,7 +113,7 @@ def keeps_clear(pose: Pose, command: Command, car: Mover, other: Box, travel: fl
         return stays_ahead(pose, command, car, other, travel)
     x, y, c, s = pose
     way = 1.0 if command.speed > 0.0 else -1.0
-    ahead = way * ((other.x - x) * c + (other.y - y) * s) + half_extent(c, s, other.c, other.s, other)
+    ahead = way * ((other.x - x) * c + (other.y - y) * s) + half_extent(-s, c, other.c, other.s, other)
     return command.yaw_rate == 0.0 and ahead + travel <= -car.half_length
 
 
@@ -139,16 +139,19 @@ def stays_ahead(pose: Pose, command: Command, car: Mover, other: Box, travel: fl
 
 @jit_rare
 def slides_on(pose: Pose, car: Mover, other: Pose) -> bool:
-    """Tell whether all that another car may reach in a tick lies before the front of a straight rectangle.
+    """Tell whether all that another car may reach in a tick lies behind a rectangle's front, or beside its way.
 
-    What touches its sides or its rear meanwhile is at fault alone (docs/rules.md#at-fault). All cars are alike.
+    The rectangle drives straight on: what touches its sides or its rear meanwhile is at fault alone
+    (docs/rules.md#at-fault). All cars are alike.
     """
     turn = min(car.yaw_most * car.period, 1.0)
     far = car.half_length + max(car.fastest, -car.slowest) * car.period
     long, broad = far + car.half_width * turn, car.half_width + far * turn
     reach = Box(other.x, other.y, other.c, other.s, long, broad, 0.0)
-    ahead = (other.x - pose.x) * pose.c + (other.y - pose.y) * pose.s
-    return ahead + half_extent(-pose.s, pose.c, other.c, other.s, reach) + GUARD <= car.half_length
+    dx, dy = other.x - pose.x, other.y - pose.y
+    ahead, aside = dx * pose.c + dy * pose.s, abs(dy * pose.c - dx * pose.s)
+    behind = ahead + half_extent(-pose.s, pose.c, other.c, other.s, reach) + GUARD <= car.half_length
+    return behind or aside - half_extent(pose.c, pose.s, other.c, other.s, reach) >= car.half_width + GUARD
 
 
 @jit_inline

@@ -72,18 +72,11 @@ POSE_SCHEMA: dict[str, Any] = {
     "minItems": 3,
     "maxItems": 3,
 }
-HEADING_SCHEMA: dict[str, Any] = {
-    "type": "array",
-    "items": {"type": "number"},
-    "minItems": 3,
-    "maxItems": 4,
-}
+HEADING_SCHEMA: dict[str, Any] = {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 4}
 GivenPose = Annotated[Any, AfterValidator(check_pose), WithJsonSchema(POSE_SCHEMA)]
 GivenHeading = Annotated[Any, AfterValidator(check_heading), WithJsonSchema(HEADING_SCHEMA)]
 Start = Annotated[
-    Any,
-    AfterValidator(check_start),
-    WithJsonSchema({"anyOf": [{"enum": ["drawn", "origin"]}, POSE_SCHEMA]}),
+    Any, AfterValidator(check_start), WithJsonSchema({"anyOf": [{"enum": ["drawn", "origin"]}, POSE_SCHEMA]})
 ]
 
 

@@ -18,15 +18,7 @@ from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.stream import Stream, next_uniform, set_stream, shuffle
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.roads.closeness import (
-    Frame,
-    Hits,
-    find_meetings,
-    find_tight,
-    frame,
-    hits,
-    put_arms,
-)
+from dubins_traffic.roads.closeness import Frame, Hits, find_meetings, find_tight, frame, hits, put_arms
 from dubins_traffic.roads.room import Clearances
 
 if TYPE_CHECKING:

@@ -4,14 +4,7 @@ from __future__ import annotations
 
 from dubins_traffic.kernels.compile import jit, jit_inline
 from dubins_traffic.policies.rules.narrow import BESIDE, EDGE, offset_in_lane
-from dubins_traffic.policies.rules.passing import (
-    BERTH,
-    NARROWS,
-    SLIP,
-    back_at,
-    passing_time,
-    stop_line,
-)
+from dubins_traffic.policies.rules.passing import BERTH, NARROWS, SLIP, back_at, passing_time, stop_line
 from dubins_traffic.policies.rules.seeing import OBSTACLE_GAP, QUEUE_GAP, SIDE
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import on_way, way_between

@@ -188,7 +188,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     speed, yaw_rate = move(
         b, n, speed, left, offset, px, py, bend, outside, way, listed, trusted, traffic
     )  # fmt: skip
-    checked = (car.kind == KIND.ROUND or offset < 0.0) and company != COMPANY.UNROLLED
+    checked = (car.kind == KIND.ROUND or offset < 0.0 or speed < 0.0) and company != COMPANY.UNROLLED
     if speed != 0.0 and checked and strays(b, n, speed, yaw_rate, way, traffic):
         speed = 0.0
     commands[b, n, 0] = speed

@@ -27,7 +27,8 @@ SLANT, STEEP = 0.7, 0.9
 ALIGNED, NIMBLE = 0.8, 0.98
 """Cosine of the angle to where it should head beyond which a car turns in place; the same when it pulls out."""
 CREEPS, SLIDES = 0.05, 0.2
-"""A car that has to return and may not drive faster than the first goes straight to the right at the second, m/s."""
+"""A car that has to return and may not drive faster than the first goes straight to the right at the second, m/s. At
+that a rectangle in a disc backs away from who is so close before it that it can't drive otherwise."""
 CLOSE = 0.002
 """Least distance from the disc ahead at which it does so right of the centre line, metres."""
 EXACT = 0.9999
@@ -114,8 +115,12 @@ def move(
         speed = 0.0
         if vehicle.half_length > 0.0 and not is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle):
             yaw_rate = 0.0
-            if n != EGO and c * px + s * py > ALIGNED and goes_on(b, n, allowed, outside, way, near, traffic):
-                speed = allowed
+            ahead = allowed if c * px + s * py > ALIGNED else 0.0
+            back = 0.0 if outside else max(vehicle.slowest, -SLIDES)
+            if ahead > 0.0 and goes_on(b, n, ahead, outside, way, near, traffic):
+                speed = ahead
+            elif back < 0.0 and goes_on(b, n, back, outside, way, near, traffic):
+                speed = back
     return speed, yaw_rate
 
 
@@ -123,18 +128,20 @@ def move(
 def goes_on(
     b: int, n: int, speed: float, outside: bool, way: ReferencePath, near: int, traffic: Traffic
 ) -> bool:
-    """Tell whether an e-agent beside which another car is as close as may be can drive straight on past it.
+    """Tell whether an e-agent beside which another car is as close as may be can drive straight past it, on or back.
 
-    The cars that it slides past are taken off the list of those near, which nobody reads any more in this tick.
+    The cars that it slides past come last in the list of those near then.
     """
     state, vehicle, scratch = traffic.state, traffic.drivers.vehicle[b], traffic.scratch
     pose, beside = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]), 0
+    sign = 1.0 if speed > 0.0 else -1.0
+    to = Pose(pose.x, pose.y, sign * pose.c, sign * pose.s)
     for k in range(near):
         j = scratch.near[k]
-        if not slides_on(pose, vehicle, Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])):
-            scratch.near[beside] = j
+        if not slides_on(to, vehicle, Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])):
+            scratch.near[k], scratch.near[beside] = scratch.near[beside], j
             beside += 1
-    on = is_safe_from(pose, b, Command(speed, 0.0), beside, -1, traffic, vehicle)
+    on = n != EGO and is_safe_from(pose, b, Command(speed, 0.0), beside, -1, traffic, vehicle)
     return on and (not outside or stays_right(b, n, speed, 0.0, way, traffic))
 
 
