@@ -101,6 +101,11 @@ CLAIMS: Mapping[str, Claim] = {
         "theory.md#the-game-and-the-road",
         "some minutes",
     ),
+    "disturbed": Claim(
+        "`rules` and the shield keep the rules with commands that come up to three ticks late and 5 mm of noise",
+        "shield.md#what-it-does-not-promise",
+        "some minutes",
+    ),
     "counter": Claim(
         "under an assumption that is too weak, a team of `counter` cars keeps the ego from a goal",
         "theory.md#a-counterstrategy-on-the-road",

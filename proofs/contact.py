@@ -35,21 +35,22 @@ EXTENT = z3.Function("extent", z3.RealSort(), z3.RealSort(), z3.RealSort())
 class Meeting:
     """A car with a command, and another body; `premises` are what is assumed of them.
 
-    `own` (m) is how far the car's points get in the tick, `travel` (m) how far those of the other car.
+    `own` (m) is how far the car's points get in the tick, `step` (m) how far those of the other car, and `travel` (m)
+    how far they are then from where they have been seen: farther, if commands come late or poses are noisy.
     """
 
     def __init__(self, *, disc: bool) -> None:
         self.car = SimpleNamespace(
             half_length=0.0 if disc else Real("half_length"), half_width=0.0 if disc else Real("half_width"),
             rounding=Real("reach") if disc else 0.0, reach=Real("reach"), period=Real("period"),
-            slowest=Real("slowest"), fastest=Real("fastest"), yaw_most=Real("yaw_most"),
+            slowest=Real("slowest"), fastest=Real("fastest"), yaw_most=Real("yaw_most"), late=0.0, unsure=0.0,
         )  # fmt: skip
         self.command: Any = Command(Real("speed"), Real("yaw_rate"))  # pyright: ignore[reportArgumentType]
         self.poses = [tuple(Real(f"{name}{k}") for name in "xycs") for k in range(QUARTERS)]
         self.pose: Any = Pose(*self.poses[0])  # pyright: ignore[reportArgumentType]
         self.gaps = [Real(f"gap{k}") for k in range(QUARTERS)]
         self.other: Any = SimpleNamespace(**{name: Real(f"other_{name}") for name in "xycs"})
-        self.own, self.travel, self.time = Real("own"), Real("travel"), Real("u")
+        self.own, self.travel, self.time, self.step = (Real(name) for name in ("own", "travel", "u", "step"))
         self._next = 0
 
     @property
@@ -61,7 +62,8 @@ class Meeting:
             real_of(self.command.speed) <= car.fastest.term, real_of(self.command.speed) >= car.slowest.term,
             real_of(abs(self.command.yaw_rate)) <= car.yaw_most.term, car.slowest.term <= 0,
             car.period.term > 0, car.reach.term > 0, *(real_of(size) >= 0 for size in sizes),
-            own >= 0, own <= self.travel.term, u >= 0, u <= 1, *(gap.term >= 0 for gap in self.gaps),
+            own >= 0, own <= self.step.term, self.step.term <= self.travel.term,
+            u >= 0, u <= 1, *(gap.term >= 0 for gap in self.gaps),
             *([] if isinstance(car.half_length, float) else [car.half_length.term > 0]),
         ]  # fmt: skip
 
@@ -79,6 +81,10 @@ class Meeting:
         k = next(k for k, pose in enumerate(self.poses) if pose[0] is body.x)
         return (self.gaps[k],) + (Real("where"),) * 4
 
+    def reached(self) -> Any:
+        """Return how far the other car's points are at time u from where they have been seen, at most."""
+        return self.travel.term - self.step.term + self.step.term * self.time.term
+
     def gap_then(self) -> tuple[Any, list[Any]]:
         """Return the gap at time u to where the other was at the beginning, and what is known of it (1.)."""
         gap, u = z3.Real("gap_then"), self.time.term
@@ -94,6 +100,7 @@ def instead(meeting: Meeting, **more: Any) -> Iterator[None]:
     names: dict[str, Any] = {
         "advance": meeting.advance, "separation": meeting.separation, "min": least, "max": greatest,
         "half_extent": lambda tx, ty, *_: Real(EXTENT(tx.term, ty.term)), "moved_by": lambda *_: meeting.own,
+        "stride_of": lambda _: meeting.step,
     }  # fmt: skip
     with replaced(safety, names | more):
         yield
@@ -111,8 +118,7 @@ def nobody_gets_farther() -> int:
     count = 0
     for disc in (True, False):
         own = Meeting(disc=disc)
-        moved = safety.moved_by
-        with instead(own, moved_by=moved):
+        with instead(own, moved_by=safety.moved_by, stride_of=safety.stride_of):
             for through, (far, most) in runs(
                 own, lambda own=own: (safety.moved_by(own.command, own.car), safety.travel_of(own.car))
             ):
@@ -138,7 +144,7 @@ def nothing_is_touched() -> int:
                 if clear is not True:
                     continue
                 count += 1
-                meets = gap - own.travel.term * own.time.term <= 0
+                meets = gap - own.reached() <= 0
                 if through.may(own.own.term > 0, meets, *known):
                     raise RefutedError("a car is touched that keeps clear")
     return count
@@ -147,7 +153,7 @@ def nothing_is_touched() -> int:
 def a_disc_leads_away() -> int:
     """Prove that a disc for which `stays_ahead` closes in on no other disc, whatever that does in the tick."""
     own = Meeting(disc=True)
-    u, travel = own.time.term, own.travel.term
+    travel, step = own.travel.term, own.step.term
     ahead, bend, along = z3.Real("ahead"), z3.Real("bend"), z3.Real("along")
     count = 0
 
@@ -169,12 +175,12 @@ def a_disc_leads_away() -> int:
                 way * ((own.other.x.term - x.term) * c.term + (own.other.y.term - y.term) * s.term)
                 for x, y, c, s in own.poses
             ]
-            then = [f + travel * z3.Q(k, 4) for k, f in enumerate(found)]
+            then = [f + travel - step + step * z3.Q(k, 4) for k, f in enumerate(found)]
             known = [bend <= turn * turn * apart, z3.Or([ahead <= f + bend / 128 for f in then])]
             if through.may(ahead > 0, *known):
                 raise RefutedError("the other is ahead of a disc that leads away")
-            # Of `ahead` the other's way is at most travel * u along the heading (Cauchy and Schwarz).
-            if through.may(ahead <= 0, along <= travel * u, ahead - travel * u + along > 0):
+            # Of `ahead` the other's way is at most `reached` along the heading (Cauchy and Schwarz).
+            if through.may(ahead <= 0, along <= own.reached(), ahead - own.reached() + along > 0):
                 raise RefutedError("a disc that leads away closes in")
     return count
 
@@ -190,21 +196,27 @@ def no_way_is_longer_along_a_heading() -> int:
 
 
 def a_rectangle_leads_away() -> int:
-    """Prove that a rectangle which drives straight on, with all that the other may reach behind it, touches nothing."""
+    """Prove that a rectangle which slides past another is touched at its sides or its rear only, if at all.
+
+    All that the other may reach is behind the line of its front, throughout the tick, or beside its way.
+    """
     own = Meeting(disc=False)
-    u, count = own.time.term, 0
-    with instead(own):
-        for through, clear in runs(own, lambda: _kept_clear(own)):
-            if not isinstance(clear, Truth):
+    count = 0
+    speed, car = own.command.speed, own.car
+    with instead(own, Box=lambda *_: None):
+        for through, slides in runs(own, lambda: safety.slides_on(own.pose, speed, car, own.other)):
+            if slides is False:
                 continue
             count += 1
-            way = 1 if through.may(real_of(own.command.speed) > 0) else -1
+            clear = truth_of(slides) if isinstance(slides, Truth) else z3.BoolVal(True)
+            way = 1 if through.may(speed.term > 0) else -1
             x, y, c, s = (value.term for value in own.poses[0])
-            ahead = way * ((own.other.x.term - x) * c + (own.other.y.term - y) * s)
-            reached = ahead + EXTENT(-s, c) + own.travel.term * u
-            rear = -own.car.half_length.term + own.own.term * u
-            if through.may(clear.term, own.own.term > 0, u > 0, rear <= reached):
-                raise RefutedError("a rectangle that leads away is reached")
+            dx, dy = own.other.x.term - x, own.other.y.term - y
+            foremost = way * (dx * c + dy * s) + EXTENT(-s, c)
+            front = car.half_length.term + own.own.term * own.time.term
+            aside = real_of(abs(Real(dy * c - dx * s))) - EXTENT(c, s)
+            if through.may(clear, foremost >= front, aside <= car.half_width.term):
+                raise RefutedError("a rectangle that slides past another may run into it")
     return count
 
 
@@ -225,7 +237,7 @@ def nobody_near_is_overlooked() -> int:
             dx, dy = (real_of(pair[0, 1] - pair[0, EGO]) for pair in (state.x, state.y))
             through.solver.add(distance.term >= 0, through.square(distance.term) == SQUARE(dx) + SQUARE(dy))
             then = distance.term - 2 * own.car.reach.term - own.own.term * own.time.term
-            if through.may(then - own.travel.term * own.time.term <= 0):
+            if through.may(then - own.reached() <= 0):
                 raise RefutedError("a car that can be touched is not listed")
     return count
 

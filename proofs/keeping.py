@@ -2,8 +2,8 @@
 
 E1 is in `quiet.keeps_while_standing`. For E2 the law's last step, `steering.move`, is run on unknown numbers: what it
 asks, such as where to steer, is anything. It must return a command that it has found safe, of which `contact` proves
-the rest, or stand, or slide past who is at its side. For E3 the judgement of who has to enter is run, and then the
-judgement of an entry from the same frame.
+the rest, or stand. For E3 the judgement of who has to enter is run, and then the judgement of an entry from the same
+frame.
 """
 
 from __future__ import annotations
@@ -38,8 +38,6 @@ class Drive:
     def __init__(self, *, disc: bool) -> None:
         self.found: list[tuple[Any, Any, Truth]] = []
         """Commands, and whether they are safe."""
-        self.slides: list[tuple[Any, Truth]] = []
-        """Speeds straight on, and whether they are safe but for cars that are slid past."""
         vehicle = SimpleNamespace(
             yaw_most=Real("yaw_most"), tightest=Real("tightest"), half_length=0.0 if disc else Real("half_length"),
             period=Real("period"), slowest=Real("slowest"),
@@ -59,13 +57,6 @@ class Drive:
         self.found.append((speed, yaw_rate, answer))
         return answer
 
-    def is_safe_from(self, pose: Any, _b: int, command: Any, *_: Any) -> Truth:
-        """Note it of a car that drives straight on from the heading that it has."""
-        answer = _either()
-        if pose.c is self.traffic.state.c[0, AGENT]:
-            self.slides.append((command.speed, answer))
-        return answer
-
     def drive(self, near: int) -> tuple[Any, Any]:
         """Run the law's last step with `near` cars listed; return the command."""
         names = ("allowed", "left", "offset", "px", "py", "bend")
@@ -78,10 +69,9 @@ class Drive:
     def _instead(self) -> dict[str, Any]:
         """Return what stands for what `steering` calls."""
         return PLAIN | {
-            "is_safe": self.is_safe, "is_safe_from": self.is_safe_from, "steer": _pair, "keep_right": _pair,
+            "is_safe": self.is_safe, "is_safe_from": _either_way, "steer": _pair, "keep_right": _pair,
             "heading": _pair, "slowed": _any_real, "room_to_return": _any_real, "along": _any_real,
-            "last_return": _any_real, "backs_off": _any_real, "within_lane": _either_way, "slides_on": _either_way,
-            "stays_right": _either_way,
+            "last_return": _any_real, "backs_off": _any_real, "within_lane": _either_way, "stays_right": _either_way,
         }  # fmt: skip
 
 
@@ -102,7 +92,7 @@ def _pair(*_: Any) -> tuple[Real, Real]:
 
 
 def drives_clear_or_stands() -> int:
-    """Prove that the law's last step returns a command that is safe, or stands, or slides past who is at its side."""
+    """Prove that the law's last step returns a command that is safe, or stands."""
     count = 0
     for disc in (True, False):
         for near in (0, 1):
@@ -122,9 +112,12 @@ def _drives_clear(make: Callable[[], Drive], near: int) -> int:
     for speed, yaw_rate in through.runs(tick):
         count += 1
         own = drives[-1]
-        safe = [answer for one, other, answer in own.found if one is speed and other is yaw_rate]
-        slid = [answer for one, answer in own.slides if one is speed and _is_zero(yaw_rate)]
-        if any(not through.may(z3.Not(truth_of(answer))) for answer in (*safe, *slid)):
+        safe = [
+            answer
+            for one, other, answer in own.found
+            if one is speed and (other is yaw_rate or (_is_zero(other) and _is_zero(yaw_rate)))
+        ]
+        if any(not through.may(z3.Not(truth_of(answer))) for answer in safe):
             continue
         # A disc that turns in place stays where it is; other bodies stand if they do not turn either.
         if not (_is_zero(speed) and (own.disc or _is_zero(yaw_rate))):

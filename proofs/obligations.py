@@ -66,8 +66,8 @@ OBLIGATIONS: Final = {
             contact.no_way_is_longer_along_a_heading,
         ),
         Obligation(
-            "straight", "A rectangle that drives straight on, away from all that the other may reach, touches nothing.",
-            SHIELD, ("policies.safety.keeps_clear",), f"rectangles, {ANY_RATE}", contact.a_rectangle_leads_away,
+            "straight", "A rectangle that drives straight past another is touched at its sides or rear only.",
+            SHIELD, ("policies.safety.slides_on",), f"rectangles, {ANY_RATE}", contact.a_rectangle_leads_away,
         ),
         Obligation(
             "listed", "Who is not looked at can't be touched in the tick.", SHIELD, ("shield.checks.gather_close",),
@@ -92,8 +92,7 @@ OBLIGATIONS: Final = {
             quiet.keeps_while_standing,
         ),
         Obligation(
-            "driven", "With others close, the law gives a command that it has found safe, or stands, or slides past "
-            "who is at its side (E2).", KEEPING,
+            "driven", "With others close, the law gives a command that it has found safe, or stands (E2).", KEEPING,
             ("policies.rules.steering.move", "policies.rules.steering.come_back", "policies.rules.steering.goes_on"),
             "discs and rectangles, every way, every offset and every speed", keeping.drives_clear_or_stands,
         ),
@@ -130,10 +129,10 @@ FLAWS: Final = (
     Flaw("reach", safety, "travel += car.yaw_most * car.reach * car.period", "travel += car.yaw_most * car.period"),
     Flaw("far", safety, "own == 0.0 or least > travel + GUARD", "own == 0.0 or least > 0.5 * travel"),
     Flaw("far", safety, "for k in range(1, 5):", "for k in range(1, 3):"),
-    Flaw("away", safety, "0.25 * k * travel + between", "between"),
+    Flaw("away", safety, "gone = 0.25 * k * stride + (travel - stride)", "gone = 0.0"),
     Flaw("away", safety, "for k in range(5):", "for k in range(4):"),
-    Flaw("away", safety, " + 0.25 * k * travel + between > 0.0", " + 0.25 * k * travel > 0.0"),
-    Flaw("straight", safety, "ahead + travel <= -car.half_length", "ahead <= -car.half_length"),
+    Flaw("away", safety, " + gone + between > 0.0", " + gone > 0.0"),
+    Flaw("straight", safety, "half_extent(-pose.s, pose.c, other.c", "half_extent(pose.c, pose.s, other.c"),
     Flaw("listed", checks, "1.2 * travel_of(vehicle)", "0.8 * travel_of(vehicle)"),
     Flaw("obstacle", safety, "least > travel + GUARD or (least == gap and", "least > travel + GUARD or ("),
     Flaw("order", queue, "car.ticket <= earliest + group_ticks", "car.ticket >= earliest + group_ticks"),

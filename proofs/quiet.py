@@ -103,7 +103,7 @@ class World:
         own = self.own
         self.vehicle = SimpleNamespace(
             half_length=own.half_length, half_width=own.half_width, rounding=own.rounding, disc=own.radius,
-            over=own.left_set, degree=own.crossing_degree, period=Real("period"),
+            over=own.left_set, degree=own.crossing_degree, period=Real("period"), unsure=0.0,
         )  # fmt: skip
         self.roads = SimpleNamespace(
             half_width=[Real("half_road")], vert_off=[0], seg_off=[0],

@@ -113,10 +113,7 @@ _PARTS = {
         "sumo": "maps.sumo:SumoNet",
     },
     "simulators": {"gazebo": "gazebo.simulator:Gazebo"},
-    "controllers": {
-        "learned": "learning.policy",
-        "synthesized": "synthesis.synthesized",
-    },
+    "controllers": {"learned": "learning.policy", "synthesized": "synthesis.synthesized"},
     "e-agents": {"counter": "synthesis.counter_team:CounterTeam"},
 }
 """What rooms above a registry add to it, by name: a module, and a class in it; map formats in the order of asking."""

@@ -90,11 +90,7 @@ class InputError(DubinsTrafficError):
             joint = "" if path is None or path.startswith("[") else "."
             path = field if path is None else f"{field}{joint}{path}"
         return InputError(
-            self.problem,
-            file=self.file or file,
-            field=path,
-            value=self.value,
-            expected=self.expected,
+            self.problem, file=self.file or file, field=path, value=self.value, expected=self.expected
         )
 
     def __str__(self) -> str:

@@ -37,7 +37,7 @@ REASONS = {
     "moved": ("looks for earlier names", "Moved"),
     "observations": ("tell drivers what they see", "senses"),
     "outside": ("keeps what code of users may change", "put_back"),
-    "policies": ("choose commands", "lanes rules waypoint"),
+    "policies": ("choose commands", "in_flight lanes rules waypoint"),
     "problem": ("draws the instance", "configuration draw files instance kinds parts settings starts"),
     "record": ("says how a trial ended and how long it took", "header sink wall"),
     "roads": ("say where points lie on them", "chains formats lookup network surface table"),

@@ -194,14 +194,14 @@ def test_a_safe_motion_meets_nobody_or_leads_away(
 def test_a_rectangle_that_slides_past_another_closes_in_on_it_in_no_contact(
     other: tuple[float, float, float], speed: float, its: tuple[float, float], rate: float
 ) -> None:
-    a, h, period, way = 0.31, 0.14, 1.0 / rate, math.copysign(1.0, speed)
+    a, h, period = 0.31, 0.14, 1.0 / rate
     car = table(Vehicle, 1)[0]
     car.half_length, car.half_width, car.reach, car.period = a, h, math.hypot(a, h), period
     car.fastest, car.slowest, car.yaw_most = 0.7, -0.7, 3.15
     c, s = sincos(other[2])
     body, beside = Box(0.0, 0.0, 1.0, 0.0, a, h, 0.0), Box(other[0], other[1], c, s, a, h, 0.0)
     assume(separation(body, beside)[0] > 0.003)
-    assume(slides_on(Pose(0.0, 0.0, way, 0.0), car, Pose(other[0], other[1], c, s)))
+    assume(slides_on(Pose(0.0, 0.0, 1.0, 0.0), speed, car, beside))
     own, drives = Drive(speed, 0.0, period), Drive(*its, period)
     met = box_contact(body, own, beside, drives, 0.0, period)
     if met < NEVER:

@@ -95,11 +95,7 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
             {"name": name, "place": place, "file": hash_of_file(place)} for name, place in places
         ],
         **({"metrics": metrics, "columns": columns} if metrics else {}),
-        "versions": {
-            OURS: package_version(),
-            "python": platform.python_version(),
-            **_versions(),
-        },
+        "versions": {OURS: package_version(), "python": platform.python_version(), **_versions()},
         "code": sources_hash(),
     }
 

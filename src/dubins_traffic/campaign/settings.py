@@ -65,9 +65,7 @@ def _rules(value: object) -> object:
 
 
 Mix = Annotated[
-    list[AgentKind],
-    BeforeValidator(_kinds),
-    Field(min_length=1, json_schema_extra=_kinds_schema),
+    list[AgentKind], BeforeValidator(_kinds), Field(min_length=1, json_schema_extra=_kinds_schema)
 ]
 RulesValue = Annotated[Any, AfterValidator(_rules), WithJsonSchema({"type": ["boolean", "object"]})]
 Some = Field(min_length=1)

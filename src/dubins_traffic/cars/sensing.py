@@ -14,7 +14,7 @@ from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, Box
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.kernels.random import DRAW, bell
+from dubins_traffic.kernels.random import DRAW, cut_bell
 from dubins_traffic.kernels.records import Rows, numbers, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.kernels.trig import sincos
@@ -166,14 +166,14 @@ def _view(b: int, n: int, row: int, seen: Seen, state: State, labels: Labels) ->
 def blur(seen: Seen, count: int, seed: Any, trial: int, tick: int, position: float, heading: float) -> None:
     """Add normal noise to the poses seen: standard deviations `position` (m, each axis) and `heading` (rad).
 
-    `neighbours` has filled the first `count` (count) rows of `seen`.
+    It is at most CUT of them. `neighbours` has filled the first `count` (count) rows of `seen`.
     """
     for k in range(count):
         pose = seen.poses[k]
         car = seen.labels[k].car
-        pose.x += position * bell(seed, trial, car, tick, DRAW.POSITION)
-        pose.y += position * bell(seed, trial, car, tick, DRAW.POSITION + 3)
-        c, s = sincos(heading * bell(seed, trial, car, tick, DRAW.HEADING))
+        pose.x += position * cut_bell(seed, trial, car, tick, DRAW.POSITION)
+        pose.y += position * cut_bell(seed, trial, car, tick, DRAW.POSITION + 3)
+        c, s = sincos(heading * cut_bell(seed, trial, car, tick, DRAW.HEADING))
         pose.c, pose.s = pose.c * c - pose.s * s, pose.s * c + pose.c * s
 
 

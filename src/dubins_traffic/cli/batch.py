@@ -34,13 +34,7 @@ TogetherOption = Annotated[
     int, typer.Option("--batch", metavar="B", min=1, help="Trials that are stepped together.")
 ]
 ThreadsOption = Annotated[
-    int,
-    typer.Option(
-        "--threads",
-        metavar="T",
-        min=1,
-        help="Groups that run at a time, if all is compiled.",
-    ),
+    int, typer.Option("--threads", metavar="T", min=1, help="Groups that run at a time, if all is compiled.")
 ]
 KeepOption = Annotated[
     str,

@@ -35,11 +35,7 @@ campaign = typer.Typer(
 FolderOption = Annotated[
     str,
     typer.Option(
-        "--output",
-        "-o",
-        metavar="DIR",
-        help="Folder of the campaign, made if missing.",
-        show_default=False,
+        "--output", "-o", metavar="DIR", help="Folder of the campaign, made if missing.", show_default=False
     ),
 ]
 RayOption = Annotated[
@@ -92,13 +88,7 @@ def run(
     try:
         with progress() as show:
             ran = run_campaign(
-                planned,
-                folder,
-                workers=workers,
-                ray=ray,
-                resume=resume,
-                records=records,
-                progress=tell,
+                planned, folder, workers=workers, ray=ray, resume=resume, records=records, progress=tell
             )
     except (KeyboardInterrupt, ClusterLostError) as error:
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)

@@ -197,8 +197,7 @@ def rehearse(
         int, typer.Option("--submissions", metavar="N", min=1, help="Those of a team to a phase.")
     ] = 10,
     trust: Annotated[
-        bool,
-        typer.Option("--trust-submissions", help="Go on where this machine can't enforce all limits."),
+        bool, typer.Option("--trust-submissions", help="Go on where this machine can't enforce all limits.")
     ] = False,
 ) -> None:
     """Send built-in controllers through all phases, and say how long the season's load will take on such workers."""

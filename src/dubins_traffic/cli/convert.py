@@ -33,8 +33,7 @@ class Sdf(StrEnum):
 
 
 FileArgument = Annotated[
-    str,
-    typer.Argument(metavar="FILE", help="A road network, a record, a bag or a log.", show_default=False),
+    str, typer.Argument(metavar="FILE", help="A road network, a record, a bag or a log.", show_default=False)
 ]
 OutputOption = Annotated[
     str, typer.Option("--output", "-o", metavar="FILE", help="What to write; its suffix says as what.")

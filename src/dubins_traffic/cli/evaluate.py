@@ -40,8 +40,7 @@ CompetitionOption = Annotated[
     ),
 ]
 PhaseOption = Annotated[
-    str,
-    typer.Option("--phase", metavar="NAME", help="A phase whose seeds are known, or have been revealed."),
+    str, typer.Option("--phase", metavar="NAME", help="A phase whose seeds are known, or have been revealed.")
 ]
 OutputOption = Annotated[
     str | None,

@@ -31,8 +31,7 @@ SUFFIXES = {Format.JSON: (".json",), Format.TEXT: (".rnd", ".txt")}
 
 
 IntersectionsOption = Annotated[
-    int | None,
-    typer.Option("--intersections", metavar="N", help="Draw a random network of N intersections"),
+    int | None, typer.Option("--intersections", metavar="N", help="Draw a random network of N intersections")
 ]
 SegmentsOption = Annotated[
     int | None,
@@ -61,10 +60,7 @@ SourceOption = Annotated[
 ScaleOption = Annotated[
     float | None,
     typer.Option(
-        "--scale",
-        metavar="K",
-        help="Metres of it for a metre of the map.",
-        show_default="a lane is 2w wide",
+        "--scale", metavar="K", help="Metres of it for a metre of the map.", show_default="a lane is 2w wide"
     ),
 ]
 WidthOption = Annotated[

@@ -85,11 +85,7 @@ Shield = Annotated[
     ),
 ]
 Sandbox = Annotated[
-    bool,
-    typer.Option(
-        "--sandbox",
-        help="Run the controller in a box; none of its code is loaded here.",
-    ),
+    bool, typer.Option("--sandbox", help="Run the controller in a box; none of its code is loaded here.")
 ]
 Limits = Annotated[
     str,
@@ -101,8 +97,7 @@ Limits = Annotated[
     ),
 ]
 Trust = Annotated[
-    bool,
-    typer.Option("--trust-submissions", help="Run it even if this machine can't enforce all limits."),
+    bool, typer.Option("--trust-submissions", help="Run it even if this machine can't enforce all limits.")
 ]
 Metrics = Annotated[
     list[str] | None,

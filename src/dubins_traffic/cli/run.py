@@ -42,13 +42,7 @@ RepeatOption = Annotated[
 ]
 SeedOption = Annotated[
     int | None,
-    typer.Option(
-        "--seed",
-        metavar="S",
-        min=0,
-        help="Seed of all random numbers.",
-        show_default="0",
-    ),
+    typer.Option("--seed", metavar="S", min=0, help="Seed of all random numbers.", show_default="0"),
 ]
 JobsOption = Annotated[int, typer.Option("--jobs", metavar="J", min=1, help="Trials at a time.")]
 DeadlineOption = Annotated[

@@ -26,8 +26,7 @@ def about() -> None:
 
 @app.command("check", epilog=CHECK_EXAMPLES)
 def check(
-    attacks: Annotated[bool, typer.Option(help="Run the attacks, too.")] = True,
-    json: options.Json = False,
+    attacks: Annotated[bool, typer.Option(help="Run the attacks, too.")] = True, json: options.Json = False
 ) -> None:
     """Say which limits hold on this machine for this user, and what enforces each; then attack a box.
 

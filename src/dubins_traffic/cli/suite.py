@@ -91,8 +91,7 @@ def _values(found: Suite, factor: str) -> list[str]:
 
 
 FolderOption = Annotated[
-    str,
-    typer.Option("--output", "-o", metavar="DIR", help="Folder, made if missing.", show_default=False),
+    str, typer.Option("--output", "-o", metavar="DIR", help="Folder, made if missing.", show_default=False)
 ]
 ControllersOption = Annotated[
     list[str] | None,

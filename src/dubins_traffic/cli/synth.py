@@ -63,8 +63,7 @@ StrategyOption = Annotated[
     typer.Option("--output", "-o", metavar="STRATEGY", help="Check the strategy and write it, `*.npz`."),
 ]
 GraphOption = Annotated[
-    str | None,
-    typer.Option("--graph", metavar="FILE", help="Write the game as an explicit graph, `*.npz`."),
+    str | None, typer.Option("--graph", metavar="FILE", help="Write the game as an explicit graph, `*.npz`.")
 ]
 SpecOption = Annotated[
     str | None,

@@ -97,17 +97,13 @@ COLUMNS: dict[str, Column] = {
     "end": Column(lambda score: (score.end or "cut off").replace("_", " "), spare=2),
     "goals visited": Column(lambda score: f"{score.goals_visited:.0%}", spare=1),
     "collisions": Column(lambda score: str(len(score.collisions))),
-    "at fault": Column(
-        lambda score: str(sum(collision.at_fault for collision in score.collisions)),
-        spare=3,
-    ),
+    "at fault": Column(lambda score: str(sum(collision.at_fault for collision in score.collisions)), spare=3),
     "off road": Column(
         lambda score: f"{score.driven.off_road_s:.1f} s", lambda scores: not _is_judged(scores)
     ),
     "driven": Column(lambda score: f"{score.driven.distance_m:.1f} m", spare=4),
     "least gap": Column(
-        lambda score: "-" if score.min_clearance_m is None else f"{score.min_clearance_m:.2f} m",
-        spare=5,
+        lambda score: "-" if score.min_clearance_m is None else f"{score.min_clearance_m:.2f} m", spare=5
     ),
     "shield ticks": Column(
         lambda score: str(score.interventions), lambda scores: any(score.interventions for score in scores)

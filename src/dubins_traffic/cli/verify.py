@@ -28,8 +28,7 @@ RecordsArgument = Annotated[
     list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)
 ]
 InstanceOption = Annotated[
-    str | None,
-    typer.Option("--instance", metavar="FILE", help="The instance that was to be run."),
+    str | None, typer.Option("--instance", metavar="FILE", help="The instance that was to be run.")
 ]
 ConfigurationOption = Annotated[
     str | None,
@@ -104,11 +103,7 @@ def verify(
 
 
 def _outcome(
-    record: str,
-    expected: Callable[[Record], Instance] | None,
-    scores: Scores | None,
-    *,
-    quiet: bool,
+    record: str, expected: Callable[[Record], Instance] | None, scores: Scores | None, *, quiet: bool
 ) -> dict[str, Any]:
     """Verify a record, print its line and return what JSON says of it."""
     from dubins_traffic.verification.verify import verify as verified

@@ -15,6 +15,7 @@ from dubins_traffic.cars.state import EGO, Command, Observation, Pose, State
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
+from dubins_traffic.policies.in_flight import InFlight
 from dubins_traffic.policies.lanes.knowledge import NOBODY, Follower, Knowledge, Manner, Sample, SeenCar
 from dubins_traffic.policies.lanes.paths import PathMaker, PathRow
 from dubins_traffic.policies.lanes.policy import decide, decide_in
@@ -62,6 +63,7 @@ class Lanes:
     def start(self, problem: Problem) -> None:
         """Find the round through the goals."""
         self._problem = problem
+        self._in_flight = InFlight(problem)
         self._network = problem.network
         self._maker = PathMaker(problem)
         self._blocked: dict[int, float] = {}
@@ -80,7 +82,8 @@ class Lanes:
                 others[car.index - 1] = (*car.pose, *car.twist, observation.tick)
             self._decide(observation.tick, *observation.pose, known, self._roads)
 
-        return self._drive(observation.tick, lambda: observation.pose, decide_now)
+        observation = self._in_flight.ahead(observation)
+        return self._in_flight.sent(self._drive(observation.tick, lambda: observation.pose, decide_now))
 
     def act_in(self, b: int, tick: int, radius: float, state: State) -> Command:
         """Drive on as the ego of trial b of a batch, which sees the cars within `radius` (m): what `act` does."""
@@ -122,7 +125,7 @@ class Lanes:
 
     def _furnish(self, pose: Pose) -> Knowledge:
         problem = self._problem
-        vehicle = vehicles_of([problem])[0]
+        vehicle = vehicles_of([problem], disturbed=True)[0]
         manner = table(Manner, 1)[0]
         manner.follow = max(FOLLOW, 2.0 * vehicle.reach + 0.5)
         others = len(problem.e_agents)

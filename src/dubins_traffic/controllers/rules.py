@@ -8,6 +8,7 @@ from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, 
 from dubins_traffic.cars.tables import ObstacleTable, pack_obstacles
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
+from dubins_traffic.policies.in_flight import InFlight
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.policy import decide
@@ -46,6 +47,7 @@ class Rules:
     def start(self, problem: Problem) -> None:
         """Find the round through the goals; InputError if the car can't keep the rules."""
         check_fit(problem, owes=False)
+        self._in_flight = InFlight(problem)
         cars = 1 + len(problem.e_agents)
         stage, distance = stages(problem.network, problem.goal_vertices)
         self._state = State.zeros(1, cars)
@@ -65,7 +67,7 @@ class Rules:
             net=np.zeros(1, dtype=np.int64),
             seed=np.zeros(1, dtype=np.uint64),
             trial=np.zeros(1, dtype=np.int64),
-            vehicle=vehicles_of([problem]),
+            vehicle=vehicles_of([problem], disturbed=True),
             car=rows,
             way=table(KeptPath, (1, cars)),
             command=kept_commands(1, cars),
@@ -79,6 +81,7 @@ class Rules:
         drivers = self._drivers
         if drivers is None:
             return Command(0.0, 0.0)
+        observation = self._in_flight.ahead(observation)
         put_observed(self._state, self._labels, observation)
         ego = drivers.car[0, EGO]
         if ego.place < 0:
@@ -90,4 +93,4 @@ class Rules:
             traffic = self._traffic = Traffic(*tables)
         self._decide(observation.tick, self._command, traffic)
         speed, yaw_rate = self._command[0, EGO].tolist()
-        return Command(speed, yaw_rate)
+        return self._in_flight.sent(Command(speed, yaw_rate))

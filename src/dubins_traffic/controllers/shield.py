@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, cast
 
 from dubins_traffic.cars.state import Command, Observation
@@ -39,6 +40,7 @@ class Shield:
 
     Notes
     -----
+    Where commands take effect late, the wrapped controller is told that they do not, and sees the ego where it will be.
     If the wrapped controller raises or gives up, the trial ends as it would without a shield. Numbers that are not
     finite count as (0, 0). Every tick in which the shield steps in becomes an event `shield`.
 
@@ -60,11 +62,11 @@ class Shield:
         """Start the other controller; InputError if the car can't keep the rules."""
         self.shield_filter.start(problem)
         self._events = []
-        self._controller.start(problem)
+        self._controller.start(replace(problem, command_delay=0))
 
     def act(self, observation: Observation) -> Command | None:
         """Return the wrapped controller's command if it breaks no rule, else the nearest one found that breaks none."""
-        asked = self._controller.act(observation)
+        asked = self._controller.act(self.shield_filter.in_flight.ahead(observation))
         if asked is None:
             return None
         given = self.shield_filter.filter(observation, asked)

@@ -235,11 +235,7 @@ def _moments(body: Body) -> tuple[float, float, float]:
         return level, level, 0.5 * MASS * body.radius * body.radius
     length, width = body.length * body.length, body.width * body.width
     height = HEIGHT * HEIGHT
-    return (
-        MASS * (width + height) / 12.0,
-        MASS * (length + height) / 12.0,
-        MASS * (length + width) / 12.0,
-    )
+    return (MASS * (width + height) / 12.0, MASS * (length + height) / 12.0, MASS * (length + width) / 12.0)
 
 
 def _hull(body: Body) -> Element:

@@ -65,13 +65,7 @@ def play(
     """
     feed = stage.feed
     result = run_trial(
-        instance,
-        stage.player,
-        record=record,
-        overwrite=overwrite,
-        sketch=False,
-        name=NAME,
-        watchers=(feed,),
+        instance, stage.player, record=record, overwrite=overwrite, sketch=False, name=NAME, watchers=(feed,)
     )
     feed.end(instance, result.ending, summarise(result.score), result.score.verdict)
     names = ", ".join(RIVALS[:-1])

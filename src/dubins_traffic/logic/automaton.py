@@ -425,8 +425,7 @@ class _Builder:
                     if target not in number:
                         if len(states) >= most:
                             raise FormulaError(
-                                "too large to be monitored",
-                                expected=f"at most {most} states in each part",
+                                "too large to be monitored", expected=f"at most {most} states in each part"
                             )
                         number[target] = len(states)
                         states.append(target)

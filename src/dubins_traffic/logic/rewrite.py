@@ -92,10 +92,7 @@ def _pushed(part: Formula, positive: bool, forms: Mapping[tuple[Formula, bool], 
         return join(forms[part.args[0], not positive], forms[part.args[1], positive])
     if part.op is Op.IFF:
         a, b = part.args
-        return disj(
-            conj(forms[a, True], forms[b, positive]),
-            conj(forms[a, False], forms[b, not positive]),
-        )
+        return disj(conj(forms[a, True], forms[b, positive]), conj(forms[a, False], forms[b, not positive]))
     args = tuple(forms[arg, positive] for arg in part.args)
     if positive:
         return rebuilt(part, args)

@@ -160,10 +160,7 @@ def _least_of_sharpest(draft: Draft, own: list[tuple[int, bool]], bearings: list
 
 
 def conflicts(
-    strands: Sequence[Strand],
-    lines: Sequence[Floats],
-    junctions: Mapping[str, Junction],
-    room: Room,
+    strands: Sequence[Strand], lines: Sequence[Floats], junctions: Mapping[str, Junction], room: Room
 ) -> dict[int, Reason]:
     """Return the strands that must go, so that no two are too near each other: the shorter of each such pair.
 
@@ -196,11 +193,7 @@ def _near(lines: Sequence[Floats], margin: float) -> Iterator[tuple[int, int]]:
 
 
 def _too_near(
-    one: Strand,
-    other: Strand,
-    lines: tuple[Floats, Floats],
-    junctions: Mapping[str, Junction],
-    room: Room,
+    one: Strand, other: Strand, lines: tuple[Floats, Floats], junctions: Mapping[str, Junction], room: Room
 ) -> bool:
     common = {one.first, one.last} & {other.first, other.last}
     for strand, line in ((one, lines[1]), (other, lines[0])):

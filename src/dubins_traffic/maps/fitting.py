@@ -214,12 +214,7 @@ def _fitted(
 
 
 def _drawn_together(
-    polygon: Floats,
-    away: Floats,
-    fixed: tuple[bool, bool],
-    samples: Floats,
-    length: float,
-    limits: Limits,
+    polygon: Floats, away: Floats, fixed: tuple[bool, bool], samples: Floats, length: float, limits: Limits
 ) -> tuple[Floats, Floats]:
     """Return a feasible polygon and its radii with fewer corners: two become one as long as nothing more is lost.
 

@@ -8,16 +8,7 @@ from typing import TYPE_CHECKING, Any, cast
 import numpy as np
 
 from dubins_traffic.cars.sensing import Surroundings, blur, neighbours, nothing_seen, rays_at, scan
-from dubins_traffic.cars.state import (
-    EGO,
-    Labels,
-    Observation,
-    Pose,
-    Propositions,
-    SensedCar,
-    State,
-    Twist,
-)
+from dubins_traffic.cars.state import EGO, Labels, Observation, Pose, Propositions, SensedCar, State, Twist
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.calls import bound

@@ -38,6 +38,10 @@ class Mover(Protocol):
         Seconds of a tick.
     near : float
         What is farther away than this is not looked at: no tick leads there, metres.
+    late : float
+        Ticks by which its commands take effect late: others move meanwhile.
+    unsure : float
+        How far any point of a car may be from where it is seen, metres.
     """
 
     half_length: float
@@ -50,6 +54,8 @@ class Mover(Protocol):
     tightest: float
     period: float
     near: float
+    late: float
+    unsure: float
 
 
 @jit_inline
@@ -59,12 +65,21 @@ def body_at(pose: Pose, car: Mover) -> Box:
 
 
 @jit_inline
+def stride_of(car: Mover) -> float:
+    """Return how far a car's centre may get in a tick, metres."""
+    return max(car.fastest, -car.slowest) * car.period
+
+
+@jit_inline
 def travel_of(car: Mover) -> float:
-    """Return how far any point of a car may get in a tick, metres."""
-    travel = max(car.fastest, -car.slowest) * car.period
+    """Return how far any point of another car may get until the tick of a command is over, metres.
+
+    It includes how wrongly both are seen.
+    """
+    travel = stride_of(car)
     if car.half_length > 0.0:
         travel += car.yaw_most * car.reach * car.period
-    return travel
+    return travel * (1.0 + car.late) + 2.0 * car.unsure
 
 
 @jit_rare
@@ -99,11 +114,11 @@ def motion_is_safe(pose: Pose, command: Command, car: Mover, other: Box, travel:
 
 @jit_inline
 def keeps_clear(pose: Pose, command: Command, car: Mover, other: Box, travel: float) -> bool:
-    """Tell whether a motion keeps a car from all that another may reach in the tick, or can only lead away from it.
+    """Tell whether a motion keeps a car from all that another may reach in the tick, or closes in on it in no contact.
 
     Of a rectangle that turns a corner may swing toward the other while the gap grows, and the other may come to touch
-    another side: so a rectangle leads away only if it drives straight on and all that the other may reach lies behind
-    it. `travel` (m) is as in `motion_is_safe`.
+    another side: so only one that drives straight on may be touched (`slides_on`). `travel` (m) is as in
+    `motion_is_safe`. All cars are alike.
     """
     own = moved_by(command, car)
     _, least, _ = gaps(pose, command, car, other, own + travel + GUARD)
@@ -111,10 +126,7 @@ def keeps_clear(pose: Pose, command: Command, car: Mover, other: Box, travel: fl
         return True
     if car.half_length == 0.0:
         return stays_ahead(pose, command, car, other, travel)
-    x, y, c, s = pose
-    way = 1.0 if command.speed > 0.0 else -1.0
-    ahead = way * ((other.x - x) * c + (other.y - y) * s) + half_extent(-s, c, other.c, other.s, other)
-    return command.yaw_rate == 0.0 and ahead + travel <= -car.half_length
+    return command.yaw_rate == 0.0 and slides_on(pose, command.speed, car, other)
 
 
 @jit_inline
@@ -130,26 +142,29 @@ def stays_ahead(pose: Pose, command: Command, car: Mover, other: Box, travel: fl
     x, y, c, s = pose
     dx, dy = other.x - x, other.y - y
     between = turn * (turn * (abs(dx) + abs(dy) + own) + own) / 128.0
+    stride = stride_of(car)
     for k in range(5):
         nx, ny, nc, ns = advance(x, y, c, s, command.speed, command.yaw_rate, 0.25 * k * car.period)
-        if way * ((other.x - nx) * nc + (other.y - ny) * ns) + 0.25 * k * travel + between > 0.0:
+        gone = 0.25 * k * stride + (travel - stride)
+        if way * ((other.x - nx) * nc + (other.y - ny) * ns) + gone + between > 0.0:
             return False
     return True
 
 
 @jit_rare
-def slides_on(pose: Pose, car: Mover, other: Pose) -> bool:
+def slides_on(pose: Pose, speed: float, car: Mover, other: Box) -> bool:
     """Tell whether all that another car may reach in a tick lies behind a rectangle's front, or beside its way.
 
-    The rectangle drives straight on: what touches its sides or its rear meanwhile is at fault alone
-    (docs/rules.md#at-fault). All cars are alike.
+    The rectangle drives straight at `speed` (m/s), its front is where it drives: what touches its sides or its rear
+    meanwhile is at fault alone (docs/rules.md#at-fault).
     """
-    turn = min(car.yaw_most * car.period, 1.0)
-    far = car.half_length + max(car.fastest, -car.slowest) * car.period
+    turn = min(car.yaw_most * car.period * (1.0 + car.late), 1.0)
+    far = car.half_length + stride_of(car) * (1.0 + car.late) + 2.0 * car.unsure
     long, broad = far + car.half_width * turn, car.half_width + far * turn
     reach = Box(other.x, other.y, other.c, other.s, long, broad, 0.0)
     dx, dy = other.x - pose.x, other.y - pose.y
     ahead, aside = dx * pose.c + dy * pose.s, abs(dy * pose.c - dx * pose.s)
+    ahead = ahead if speed > 0.0 else -ahead
     behind = ahead + half_extent(-pose.s, pose.c, other.c, other.s, reach) + GUARD <= car.half_length
     return behind or aside - half_extent(pose.c, pose.s, other.c, other.s, reach) >= car.half_width + GUARD
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 from typing import TYPE_CHECKING, Any, Self
 
@@ -56,7 +56,9 @@ class Problem(Pictured):
 
     `goals` are lattice points (x, y) of intersections; `goal_vertices` their numbers in `network.intersections`.
     `rules` holds the parameters of docs/rules.md by name, empty where the rules are not to be judged; `formulas` the
-    texts of what is judged beside the task, by name. Neither can be changed.
+    texts of what is judged beside the task, by name. Neither can be changed. The ego's commands
+    take effect `command_delay` ticks late, and `pose_noise` holds the standard deviations of the poses that its driver
+    sees (m along each axis, rad): the noise is normal, cut at three of them (`Disturbances`).
     """
 
     network: RoadNetwork
@@ -70,6 +72,8 @@ class Problem(Pictured):
     e_agents: tuple[str, ...]
     rules: Mapping[str, Any]
     formulas: Mapping[str, str] = field(default_factory=dict[str, str])
+    command_delay: int = 0
+    pose_noise: tuple[float, float] = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rules", read_only(self.rules))
@@ -104,6 +108,14 @@ class Problem(Pictured):
         return 1.0 / self.rate
 
 
+def _disturbed(problem: Problem, by: Disturbances) -> Problem:
+    """Return a problem with the delay and the noise of disturbances: itself if it has them."""
+    noise = (by.position_noise, by.heading_noise)
+    if (problem.command_delay, problem.pose_noise) == (by.command_delay, noise):
+        return problem
+    return replace(problem, command_delay=by.command_delay, pose_noise=noise)
+
+
 @dataclass(frozen=True, slots=True)
 class Instance(Pictured):
     """One instance: everything that, with a controller, decides a trial.
@@ -124,14 +136,10 @@ class Instance(Pictured):
     extra: Mapping[str, Any] = field(default_factory=dict[str, Any])
 
     def __post_init__(self) -> None:
-        problem = self.problem
+        problem = _disturbed(self.problem, self.disturbances)
+        object.__setattr__(self, "problem", problem)
         if not problem.network.is_straight:
-            check_curves(
-                problem.network,
-                problem.intersection_radius,
-                problem.car,
-                problem.rules,
-            )
+            check_curves(problem.network, problem.intersection_radius, problem.car, problem.rules)
 
     def __deepcopy__(self, memo: object) -> Self:
         """Return this object itself, which is immutable."""

@@ -64,12 +64,7 @@ def check_demands(
         raise error.within(field=None if first.field == "intersection_radius" else "rnd")
 
 
-def check_curves(
-    network: RoadNetwork,
-    radius: float,
-    car: Car,
-    rules: Mapping[str, Any],
-) -> None:
+def check_curves(network: RoadNetwork, radius: float, car: Car, rules: Mapping[str, Any]) -> None:
     """Refuse a network with a curve that is too tight, or too near to other roads.
 
     Raises

@@ -12,19 +12,24 @@ from dubins_traffic.problem.document import instance_from_document, instance_to_
 from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.problem.kinds import REMOTE
 
-SECRET = ("starts", "duration", "seed", "trial", "disturbances", "end_on_collision", "simulator")
+SECRET = ("starts", "duration", "seed", "trial", "end_on_collision", "simulator")
 """Fields of an instance that a controller is not given."""
 
 
 def problem_to_document(problem: Problem) -> dict[str, Any]:
     """Return the document of `problem`: that of an instance, version 1, without the fields in `SECRET`.
 
-    Of the e-agents it gives the names alone; their type is always given as `remote`.
+    Of the disturbances it gives delay and noise, if there are any. Of the e-agents it gives the names alone; their type
+    is always given as `remote`.
     """
     cars = 1 + len(problem.e_agents)
     agents = tuple(EAgent(REMOTE, name, REMOTE) for name in problem.e_agents)
     instance = Instance(problem, (Pose(0.0, 0.0, 1.0, 0.0),) * cars, 1.0, agents, seed=0, trial=0)
-    return {key: value for key, value in instance_to_document(instance).items() if key not in SECRET}
+    (position, heading), delay = problem.pose_noise, problem.command_delay
+    known = {"position_noise": position, "heading_noise": heading, "command_delay": delay}
+    whole = instance_to_document(instance)
+    document = {key: value for key, value in whole.items() if key not in (*SECRET, "disturbances")}
+    return document | {"disturbances": known} if any(known.values()) else document
 
 
 def problem_from_document(document: Mapping[str, Any], file: str | None = None) -> Problem:

@@ -138,13 +138,7 @@ def random_network(
 
 
 def thinned_grid(
-    draws: Draws,
-    rows: int,
-    columns: int,
-    removed: float,
-    *,
-    length: float = 3.0,
-    rigid_motion: bool = False,
+    draws: Draws, rows: int, columns: int, removed: float, *, length: float = 3.0, rigid_motion: bool = False
 ) -> RoadNetwork:
     """Return a grid without a share of its segments, drawn at random; it stays connected.
 

@@ -48,11 +48,7 @@ RULES: Final[tuple[str, ...]] = (
 )  # fmt: skip
 """Names of the rules, by number."""
 
-PENDING: Final = (
-    ("2.return", "free_since"),
-    ("E3.enter", "first_since"),
-    ("E4", "exit_counts"),
-)
+PENDING: Final = (("2.return", "free_since"), ("E3.enter", "first_since"), ("E4", "exit_counts"))
 """Rules that a car breaks if nothing changes for long enough, and the field of `JudgedCar` whose run tells so."""
 
 MOST: Final = len(RULES)

@@ -282,10 +282,7 @@ def spread(rows: Rows[R], index: Ints) -> Rows[R]:
 
 
 def pack_rules(
-    parameters: Sequence[RuleParameters],
-    radii: Sequence[float],
-    rates: Sequence[float],
-    cars: CarTable,
+    parameters: Sequence[RuleParameters], radii: Sequence[float], rates: Sequence[float], cars: CarTable
 ) -> Rows[TrialRules]:
     """Return the rules of each trial as a table; `net` and `judged3` are left to fill in.
 

@@ -111,12 +111,7 @@ def margin_rules(rules: Sequence[RuleParameters], periods: Sequence[float], inde
 
 @jit
 def find_margins(
-    trials: Ints,
-    frames: Ints,
-    ego: Grid[EgoFrame],
-    nets: Ints,
-    tables: MarginTables,
-    found: Rows[EgoMargins],
+    trials: Ints, frames: Ints, ego: Grid[EgoFrame], nets: Ints, tables: MarginTables, found: Rows[EgoMargins]
 ) -> None:
     """Write the margins of some trials into `found` (B,).
 

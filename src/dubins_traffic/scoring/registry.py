@@ -20,9 +20,7 @@ from dubins_traffic.scoring.metric import KINDS, Column, Kind, Maker, MetricSpec
 
 STRATEGY_SHARE = "strategy_share"
 """The metric that every trial has whose ego plays a strategy of another tool."""
-BUILT_IN = {
-    STRATEGY_SHARE: ("dubins_traffic.scoring.strategy_share", "StrategyShare"),
-}
+BUILT_IN = {STRATEGY_SHARE: ("dubins_traffic.scoring.strategy_share", "StrategyShare")}
 """The metrics that core knows by name: module and class."""
 GROUP = "dubins_traffic.metrics"
 """Group of the entry points by which other packages offer metrics."""

@@ -25,14 +25,7 @@ from dubins_traffic.errors import DubinsTrafficError, InputError, shown
 from dubins_traffic.service import receiving, standings, submissions, viewing
 from dubins_traffic.service.accounts import WrongEntryError, make_team, note
 from dubins_traffic.service.database import numbered
-from dubins_traffic.service.database_tables import (
-    Account,
-    Announcement,
-    Competition,
-    Phase,
-    Submission,
-    Team,
-)
+from dubins_traffic.service.database_tables import Account, Announcement, Competition, Phase, Submission, Team
 from dubins_traffic.service.service import Service, competition_of
 
 SLUG = re.compile(r"[a-z0-9](?:[a-z0-9-]{0,58}[a-z0-9])?")

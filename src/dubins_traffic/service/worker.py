@@ -162,11 +162,7 @@ class Worker:
             return self._judged(phase, submission, lease, lost)
 
     def _judged(
-        self,
-        phase: Phase,
-        submission: Submission,
-        lease: dict[str, Any],
-        lost: threading.Event,
+        self, phase: Phase, submission: Submission, lease: dict[str, Any], lost: threading.Event
     ) -> dict[str, Any] | None:
         numbers: list[int] = lease["numbers"]
         trials: list[dict[str, Any]] = []

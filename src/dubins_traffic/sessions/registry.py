@@ -136,10 +136,7 @@ TRANSPORTS: dict[str, TransportEntry] = {
                 metavar="S",
             ),
             Option(
-                "--poses",
-                str,
-                "Of that world: PoseStamped of each car, {} for its name.",
-                metavar="TOPIC",
+                "--poses", str, "Of that world: PoseStamped of each car, {} for its name.", metavar="TOPIC"
             ),
         ),
         remappings=True,
@@ -175,13 +172,7 @@ TRANSPORTS: dict[str, TransportEntry] = {
         ),
         options=(
             Option(
-                "--domain",
-                int,
-                "DDS domain.",
-                metavar="N",
-                low=0,
-                high=232,
-                shown="$ROS_DOMAIN_ID, else 0",
+                "--domain", int, "DDS domain.", metavar="N", low=0, high=232, shown="$ROS_DOMAIN_ID, else 0"
             ),
             Option(
                 "--wide",

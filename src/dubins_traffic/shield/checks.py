@@ -99,7 +99,7 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
     nx, ny, nc, ns = advance(x, y, c, s, speed, yaw_rate, vehicle.period)
     after = Pose(nx, ny, nc, ns)
     segment, off2 = nearest_segment(roads, net, nx, ny)
-    edge = float(roads.half_width[net]) - VERGE
+    edge = float(roads.half_width[net]) - VERGE - vehicle.unsure
     if off2 > edge * edge:
         _, before2 = nearest_segment(roads, net, x, y)
         if off2 >= before2:
@@ -108,7 +108,8 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
     found = _enters(b, v, after, traffic)
     if found != REASON.NOTHING:
         return found
-    at = v if away2 < vehicle.disc * vehicle.disc else -1
+    rim = vehicle.disc - vehicle.unsure
+    at = v if away2 < rim * rim else -1
     found = _leaves_lane(b, at, segment, off2, after, traffic, shields)
     if found != REASON.NOTHING:
         return found
@@ -126,7 +127,7 @@ def _enters(b: int, v: int, pose: Pose, traffic: Traffic) -> int:
         return REASON.NOTHING
     vx, vy = roads.vertex[row].x, roads.vertex[row].y
     half_length, half_width = vehicle.half_length, vehicle.half_width
-    edge = vehicle.disc + vehicle.rounding + BRINK
+    edge = vehicle.disc + vehicle.unsure + vehicle.rounding + BRINK
     x, y, c, s = pose
     after2 = distance2_to_body(vx, vy, x, y, c, s, half_length, half_width)
     if after2 >= edge * edge:
@@ -162,7 +163,7 @@ def _leaves_lane(
     after, progress, lateral, turned = along_lane(roads, net, after, fresh, top, back, pose)
     if turned:
         return REASON.TURN
-    if not fresh and after == lane and top - progress > back - TURNING:
+    if not fresh and after == lane and top - progress > back - TURNING - 2.0 * vehicle.unsure:
         before, _ = lane_coordinates(roads, net, lane, state.x[b, EGO], state.y[b, EGO])
         if progress < before:
             return REASON.TURN
@@ -170,7 +171,7 @@ def _leaves_lane(
     half = half_extent(tx, ty, pose.c, pose.s, vehicle)
     reach = lateral + half
     if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:
-        return REASON.RETURN if reach >= shields.ego[b].left_release else REASON.NOTHING
+        return REASON.RETURN if reach + vehicle.unsure >= shields.ego[b].left_release else REASON.NOTHING
     if reach <= vehicle.over - BRINK:
         return REASON.NOTHING
     return (

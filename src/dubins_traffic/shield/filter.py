@@ -9,9 +9,11 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Command, Labels, Observation, State, put_observed
 from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.calls import bound
+from dubins_traffic.policies.in_flight import InFlight
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.tables import Traffic, scratch
 from dubins_traffic.roads.table import pack
+from dubins_traffic.shield.checks import bounded
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import (
     REASONS,
@@ -56,6 +58,8 @@ class ShieldFilter:
         That of the last tick; None if its command was let through.
     count : int
         Number of ticks in which the shield has stepped in.
+    in_flight : InFlight
+        The commands that have not taken effect yet.
     """
 
     def __init__(self, *, overtakes: Overtakes = "sure") -> None:
@@ -66,6 +70,7 @@ class ShieldFilter:
     def start(self, problem: Problem) -> None:
         """Prepare for a trial; InputError if the car can't keep the rules (`policies.rules.fitness`)."""
         check_fit(problem, owes=False)
+        self.in_flight = InFlight(problem)
         cars = 1 + len(problem.e_agents)
         self.intervention = None
         self.count = 0
@@ -97,13 +102,14 @@ class ShieldFilter:
             Speed, m/s, and yaw rate, rad/s. Out of bounds it means what the simulator makes of it; numbers that are
             not finite mean (0, 0).
         """
-        put_observed(self._state, self._labels, observation)
+        put_observed(self._state, self._labels, self.in_flight.ahead(observation))
         self._tick[0] = observation.tick
         asked = (float(command[0]), float(command[1]))
         self._command[0, EGO] = asked
         self._shield()
         reason = int(self._shields.ego[0].reason)
         given = Command(*self._command[0, EGO].tolist())
+        self.in_flight.sent(bounded(*given, self._traffic.drivers.vehicle[0]))
         self.intervention = None
         if reason:
             self.count += 1

@@ -24,9 +24,7 @@ from dubins_traffic.rules.blocking import RightLane, obstacle_narrows
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.shape import distance2_to_body, half_extent
 from dubins_traffic.shield.checks import BRINK, TURNING, VERGE, bounded, may_touch
-from dubins_traffic.shield.tables import (
-    ShieldTables,
-)
+from dubins_traffic.shield.tables import ShieldTables
 
 LONGEST = 60.0
 """Longest rehearsal, seconds; a way back that takes longer is not found."""
@@ -138,13 +136,13 @@ def _leaves(lane: int, pose: Pose, roads: RoadTable, net: int, vehicle: Vehicle)
     """Tell whether an ego at a pose is off the road of its lane, or its body meets a disc."""
     x, y, c, s = pose
     segment, off2 = nearest_segment(roads, net, x, y)
-    edge = float(roads.half_width[net]) - VERGE
+    edge = float(roads.half_width[net]) - VERGE - vehicle.unsure
     if segment != lane >> 1 or off2 > edge * edge:
         return True
     v, _ = nearest_vertex(roads, net, x, y)
     row = int(roads.vert_off[net]) + v
     vx, vy = roads.vertex[row].x, roads.vertex[row].y
-    rim = vehicle.disc + vehicle.rounding + BRINK
+    rim = vehicle.disc + vehicle.unsure + vehicle.rounding + BRINK
     return distance2_to_body(vx, vy, x, y, c, s, vehicle.half_length, vehicle.half_width) < rim * rim
 
 

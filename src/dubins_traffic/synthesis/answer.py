@@ -21,11 +21,7 @@ from dubins_traffic.synthesis.instance import assumption_of, cells_of, start_pos
 from dubins_traffic.synthesis.routes import route_bound
 from dubins_traffic.synthesis.solver import Ranks, Solution, solve
 
-STEPS = {
-    "E3": ("E3:one-forfeit", "E3"),
-    "E4": ("E4:unmet", "E4"),
-    "E5": ("E5", "E5:moves-up"),
-}
+STEPS = {"E3": ("E3:one-forfeit", "E3"), "E4": ("E4:unmet", "E4"), "E5": ("E5", "E5:moves-up")}
 """Words of a part from weak to strong, where more than one can be added."""
 BENDS_ALONE = {"E4:unmet", "E5:moves-up"}
 """Words that make a difference only where there are bends or dead ends that are no crossings."""

@@ -22,13 +22,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import COUNTER, parameters_of
 from dubins_traffic.synthesis.archive import SUFFIXES
 from dubins_traffic.synthesis.foreign.machine import Machine
-from dubins_traffic.synthesis.foreign.player import (
-    Answer,
-    Labelled,
-    MachinePlayer,
-    PlayPosition,
-    check_fit,
-)
+from dubins_traffic.synthesis.foreign.player import Answer, Labelled, MachinePlayer, PlayPosition, check_fit
 from dubins_traffic.synthesis.foreign.read import read_machine
 from dubins_traffic.synthesis.game import Game, Progress
 from dubins_traffic.synthesis.instance import start_cells, start_positions
@@ -292,11 +286,7 @@ def check_player(
 
 
 def _explored(
-    game: Game,
-    player: Player,
-    named: Labelled,
-    starts: Sequence[PlayPosition],
-    progress: Progress | None,
+    game: Game, player: Player, named: Labelled, starts: Sequence[PlayPosition], progress: Progress | None
 ) -> _Graph:
     graph = _Graph()
     number: dict[tuple[PlayPosition, Memory], int] = {}

@@ -222,10 +222,7 @@ def _bits(column: Floats | np.ndarray) -> np.ndarray:
 
 
 def _unequal(
-    what: str,
-    recorded: Sequence[Contact | Event],
-    expected: Sequence[Contact | Event],
-    instance: Instance,
+    what: str, recorded: Sequence[Contact | Event], expected: Sequence[Contact | Event], instance: Instance
 ) -> Difference | None:
     """Return the first contact or event that differs from the expected one."""
     for k in range(max(len(recorded), len(expected))):

@@ -208,15 +208,7 @@ def goal_names(problem: Problem, size: Width, lift: float = 0.0) -> list[Shape]:
     for vertex, numbers in goal_numbers(problem).items():
         x, y = problem.network.points[vertex].tolist()
         found.append(
-            Text(
-                x,
-                y + lift,
-                f"goal {numbers}",
-                palette.GOAL_INK_COLOUR,
-                size,
-                bold=True,
-                number=numbers,
-            )
+            Text(x, y + lift, f"goal {numbers}", palette.GOAL_INK_COLOUR, size, bold=True, number=numbers)
         )
     return found
 

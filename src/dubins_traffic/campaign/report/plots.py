@@ -41,11 +41,7 @@ VERDICTS: Mapping[str, str] = {
     "excused": "#E69F00",
     "violated": palette.CONTACT_COLOUR,
 }
-FAULTS: Mapping[str, str] = {
-    "the ego": palette.CONTACT_COLOUR,
-    "both": "#882255",
-    "the other": "#56B4E9",
-}
+FAULTS: Mapping[str, str] = {"the ego": palette.CONTACT_COLOUR, "both": "#882255", "the other": "#56B4E9"}
 FORMULA: Mapping[str, str] = {
     "true": palette.GOAL_COLOUR,
     "presumably true": "#56B4E9",

@@ -235,7 +235,7 @@ def cache_command(
     minds = NOWHERE
     if gated:
         along = (x - way.cx) * way.tx + (y - way.cy) * way.ty
-        edge = vehicle.disc + vehicle.reach + MARGIN
+        edge = vehicle.disc + vehicle.reach + vehicle.unsure + MARGIN
         spare = -way_to_go(way, x, y) - edge - speed * vehicle.period - CERTAIN
         high = min(high, along + spare)
         if drivers.car[b, n].kind != KIND.ROUND:

@@ -184,7 +184,7 @@ def count_turn(bits: Any, way: KeptPath, car: Driver) -> bool:
 @jit_inline
 def to_line(left: float, x: float, y: float, way: ReferencePath, vehicle: Vehicle) -> float:
     """Return the distance, metres, to the line at which the car waits until it may enter the disc ahead."""
-    edge = vehicle.disc + vehicle.reach + MARGIN
+    edge = vehicle.disc + vehicle.reach + vehicle.unsure + MARGIN
     aside = left - vehicle.middle
     return -way_to_go(way, x, y) - sqrt(max(edge * edge - aside * aside, 0.0))
 

@@ -28,7 +28,7 @@ PRESSED = 0.4
 @jit_inline
 def queue_lengths(vehicle: Vehicle) -> tuple[float, float]:
     """Return how far from a disc's centre a car has left the disc, and how far apart waiting cars are, metres."""
-    edge = vehicle.disc + vehicle.reach + MARGIN
+    edge = vehicle.disc + vehicle.reach + vehicle.unsure + MARGIN
     mouth = sqrt(max(edge * edge - vehicle.middle * vehicle.middle, 0.0))
     return mouth, 2.0 * vehicle.reach + QUEUE_GAP
 

@@ -17,7 +17,7 @@ from dubins_traffic.policies.rules.seeing import ABRUPT, ASTRAY
 from dubins_traffic.policies.rules.standing import may_drive_on, stays_right
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
-from dubins_traffic.policies.safety import may_hit, may_meet, slides_on, travel_of
+from dubins_traffic.policies.safety import may_hit, may_meet, travel_of
 from dubins_traffic.rules.propositions import FLAG
 
 HURRY, WIDE = 0.25, 0.4
@@ -128,20 +128,9 @@ def move(
 def goes_on(
     b: int, n: int, speed: float, outside: bool, way: ReferencePath, near: int, traffic: Traffic
 ) -> bool:
-    """Tell whether an e-agent beside which another car is as close as may be can drive straight past it, on or back.
-
-    The cars that it slides past come last in the list of those near then.
-    """
-    state, vehicle, scratch = traffic.state, traffic.drivers.vehicle[b], traffic.scratch
-    pose, beside = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]), 0
-    sign = 1.0 if speed > 0.0 else -1.0
-    to = Pose(pose.x, pose.y, sign * pose.c, sign * pose.s)
-    for k in range(near):
-        j = scratch.near[k]
-        if not slides_on(to, vehicle, Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j])):
-            scratch.near[k], scratch.near[beside] = scratch.near[beside], j
-            beside += 1
-    on = n != EGO and is_safe_from(pose, b, Command(speed, 0.0), beside, -1, traffic, vehicle)
+    """Tell whether an e-agent to which another car is as close as may be can drive straight past it, on or back."""
+    vehicle = traffic.drivers.vehicle[b]
+    on = n != EGO and is_safe(b, n, speed, 0.0, near, -1, traffic, vehicle)
     return on and (not outside or stays_right(b, n, speed, 0.0, way, traffic))
 
 

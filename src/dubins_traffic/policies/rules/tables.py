@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import sqrt
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable, pack_cars
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
+from dubins_traffic.kernels.random import CUT
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.abilities import DAWDLE, least_speed, near_of, sight_of, through_speed
@@ -186,6 +188,10 @@ class Vehicle:
     """Smallest speed, m/s."""
     near: float
     """The gap up to which others are looked at for whether a motion might bring about a contact, metres."""
+    late: float
+    """Ticks by which commands take effect late."""
+    unsure: float
+    """How far any point of a car may be from where it is seen, metres."""
     sight: float
     """What is farther away than this does not matter to a car's next tick, metres."""
     forfeit: float
@@ -305,8 +311,8 @@ def scratch(cars: int, segments: int, obstacles: ObstacleTable) -> Scratch:
     )  # fmt: skip
 
 
-def vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
-    """Return `Drivers.vehicle`."""
+def vehicles_of(problems: Sequence[Problem], *, disturbed: bool = False) -> Rows[Vehicle]:
+    """Return `Drivers.vehicle`; those of egos are disturbed: commands take effect late, and poses are noisy."""
     kinds, index = distinct_problems(problems)
     made: Any = _vehicles_of(kinds)
     rows = made[index]
@@ -315,6 +321,11 @@ def vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
     )
     least = np.array([least_speed(problems[k]) for k in first])
     rows["dawdle"] = np.maximum(DAWDLE, least)[alike]
+    for own, problem in zip(rows, problems if disturbed else (), strict=False):
+        position, heading = (CUT * noise for noise in problem.pose_noise)
+        own.late, own.unsure = problem.command_delay, sqrt(2.0) * position + own.reach * heading
+        own.over -= own.unsure
+        own.near = near_of(problem.car, problem.period * (1.0 + own.late)) + 2.0 * own.unsure
     return rows
 
 

@@ -103,12 +103,7 @@ class Api(Controller):
         opt={requests.FILES: True},
     )
     def submit(
-        self,
-        service: ServiceHere,
-        viewer: ViewerHere,
-        slug: Name,
-        name: Name,
-        data: MultipartBody[Handed],
+        self, service: ServiceHere, viewer: ViewerHere, slug: Name, name: Name, data: MultipartBody[Handed]
     ) -> Response[dict[str, Any]]:
         """Hand in a submission; the same bytes again are the same submission, with status 200."""
         sent = data.file.file.read()

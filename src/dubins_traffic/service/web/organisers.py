@@ -84,10 +84,7 @@ class Organisers(Controller):
 
     @post("/create", sync_to_thread=True, opt={requests.FILES: True})
     def create(
-        self,
-        service: ServiceHere,
-        viewer: ViewerHere,
-        data: MultipartBody[NewCompetition],
+        self, service: ServiceHere, viewer: ViewerHere, data: MultipartBody[NewCompetition]
     ) -> Redirect:
         """Make a competition from its files."""
         made = organising.create(service, data.address, _given(data.files), viewer.person)

@@ -29,14 +29,7 @@ from dubins_traffic.service import (
 )
 from dubins_traffic.service.accounts import WrongEntryError
 from dubins_traffic.service.database import LARGEST_NUMBER, numbered
-from dubins_traffic.service.database_tables import (
-    Account,
-    Competition,
-    Submission,
-    Team,
-    Token,
-    Trial,
-)
+from dubins_traffic.service.database_tables import Account, Competition, Submission, Team, Token, Trial
 from dubins_traffic.service.hiding import replays_of
 from dubins_traffic.service.receiving import UnknownError
 from dubins_traffic.service.service import Service

@@ -14,13 +14,7 @@ from dubins_traffic.errors import TransportError
 from dubins_traffic.protocols import End, Ending, Mailbox, View
 from dubins_traffic.transports.labels import Caption
 from dubins_traffic.transports.lcm import connection, encoding
-from dubins_traffic.transports.lcm.dubins_traffic_lcm import (
-    command_t,
-    end_t,
-    grant_t,
-    labels_t,
-    mode_t,
-)
+from dubins_traffic.transports.lcm.dubins_traffic_lcm import command_t, end_t, grant_t, labels_t, mode_t
 from dubins_traffic.transports.maestro import Maestro, Mode, closing_if_refused
 
 if TYPE_CHECKING:

@@ -1,0 +1,120 @@
+"""Drivers whose commands come late and who see noisy poses; `experiments.disturbed` runs 1,600 trials of them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from experiments.disturbed import CONTROLLERS, Drive, driven
+
+from dubins_traffic.cars.state import Command, Observation, Pose, Propositions, Twist
+from dubins_traffic.controllers.rules import Rules
+from dubins_traffic.controllers.shield import Shield
+from dubins_traffic.kernels.trig import advance
+from dubins_traffic.policies.in_flight import InFlight
+from dubins_traffic.problem.configuration import load_config
+from dubins_traffic.problem.draw import draw
+from dubins_traffic.problem.instance import Problem
+from dubins_traffic.problem.parts import Disturbances
+from dubins_traffic.problem.public_problem import problem_from_document, problem_to_document
+from dubins_traffic.rules.propositions import FLAG
+from dubins_traffic.runs.single import run_trial
+
+
+def problem(**disturbances: float) -> Problem:
+    instance = draw(load_config("town"), 7, 0)
+    return replace(instance, disturbances=Disturbances(**disturbances)).problem
+
+
+def seen(tick: int, bits: int = 0) -> Observation:
+    pose = Pose(*advance(0.0, 0.0, 1.0, 0.0, 0.3, 0.2, tick / 30.0))
+    return Observation(tick, tick / 30.0, pose, Twist(0.3, 0.2), Propositions(-1, -1, -1, -1, bits), (), None)
+
+
+@pytest.mark.parametrize("delay", [0, 1, 3])
+@pytest.mark.parametrize("controller", CONTROLLERS)
+def test_drivers_keep_the_rules_with_late_commands_and_noise(controller: str, delay: int) -> None:
+    trials = [driven(Drive(controller, delay, number)) for number in (43, 51, 182, 188)]
+    assert [one.broken for one in trials] == [()] * 4
+    assert sum(one.rounds for one in trials) >= 4
+
+
+def test_a_delay_that_nobody_counts_in_breaks_rules() -> None:
+    """The same trials with drivers who are not told of it."""
+
+    class Untold(Rules):
+        def start(self, problem: Problem) -> None:
+            super().start(replace(problem, command_delay=0, pose_noise=(0.0, 0.0)))
+
+    instance = draw(load_config("town"), 7, 0)
+    late = replace(instance, disturbances=Disturbances(command_delay=3), duration=120.0)
+    verdict = run_trial(late, Untold(), sketch=False).score.verdict
+    assert verdict is not None
+    assert any(one.car == "ego" for one in verdict.violations)
+
+
+def test_the_ego_is_seen_where_it_will_be() -> None:
+    flight = InFlight(problem(command_delay=2))
+    commands = [Command(0.5, 0.1), Command(0.4, -0.2), Command(0.0, 0.9)]
+    ahead = []
+    for tick, command in enumerate(commands):
+        ahead.append(flight.ahead(seen(tick)))
+        assert flight.sent(command) is command
+    assert [tuple(one.pose) for one in ahead[:1]] == [(0.0, 0.0, 1.0, 0.0)]
+    assert ahead[0].twist == (0.0, 0.0)
+    pose = tuple(seen(2).pose)
+    for command in commands[:2]:
+        pose = advance(*pose, *command, 1.0 / 30.0)
+    assert ahead[2].pose == pose
+    assert ahead[2].twist == commands[1]
+    assert ahead[2].others == ()
+
+
+def test_without_a_delay_nothing_is_moved() -> None:
+    flight, observation = InFlight(problem(position_noise=0.01)), seen(5, FLAG.FIRST)
+    assert flight.ahead(observation) is observation
+
+
+def test_a_place_counts_once_nobody_can_come_before_and_while_it_lasts() -> None:
+    own = problem(command_delay=2)
+    flight, bits = InFlight(own), int(FLAG.STOPPED | FLAG.FIRST | FLAG.CLEAR)
+    first = [bool(flight.ahead(seen(tick, bits)).propositions.bits & FLAG.FIRST) for tick in range(100)]
+    assert first.index(True) == 3  # group_time, 0.1 s
+    assert [tick for tick in range(3, 100) if not first[tick]] == list(range(87, 100))  # forfeit_time, 3 s
+    withheld = flight.ahead(seen(100, bits)).propositions.bits
+    assert withheld & FLAG.AHEAD
+    assert withheld & FLAG.STOPPED
+
+
+def test_a_problem_says_delay_and_noise_to_drivers_elsewhere() -> None:
+    known: dict[str, Any] = {"command_delay": 2, "position_noise": 0.007, "heading_noise": 0.01}
+    own = problem(**known, command_loss=0.5)
+    assert (own.command_delay, own.pose_noise) == (2, (0.007, 0.01))
+    document = problem_to_document(own)
+    assert document["disturbances"] == known
+    assert problem_from_document(document) == own
+    assert "disturbances" not in problem_to_document(problem())
+    assert problem(command_loss=0.5).command_delay == 0
+
+
+def test_the_shield_tells_what_it_wraps_of_no_delay() -> None:
+    told: list[Any] = []
+
+    class Asks:
+        def start(self, problem: Problem) -> None:
+            told.append(problem.command_delay)
+
+        def act(self, observation: Observation) -> tuple[float, float]:
+            told.append(tuple(observation.pose))
+            return 0.5, 0.0
+
+    instance = draw(load_config("town"), 7, 0)
+    late = replace(instance, disturbances=Disturbances(command_delay=3), duration=1.0)
+    result = run_trial(late, Shield(Asks()), sketch=False)
+    assert told[0] == 0
+    assert result.score.verdict is not None
+    poses = np.array(told[1:])
+    assert poses.shape == (30, 4)
+    assert np.hypot(*(poses[10, :2] - np.array(instance.starts[0][:2]))) > np.float64(0.0)
