@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json as json_text
+import os
 from enum import StrEnum
 from typing import TYPE_CHECKING, Annotated
 
@@ -20,6 +21,7 @@ EXAMPLES = options.examples(
     "check-controller theirs.py:Driver --sandbox",
     "check-controller ./my_controller --over lcm",
     'check-controller "rosrun my_package my_node" --over ros1',
+    "check-controller rules --robustness",
 )
 
 
@@ -50,6 +52,13 @@ def check_controller(
     sandbox: options.Sandbox = False,
     limits: options.Limits = "",
     trust: options.Trust = False,
+    robust: Annotated[
+        bool,
+        typer.Option(
+            "--robustness",
+            help="Instead: how it drives with commands that come late or get lost, and noisy poses.",
+        ),
+    ] = False,
     json: options.Json = False,
 ) -> None:
     """Run a controller through a short course, twice, and say what a competition would say of it.
@@ -63,6 +72,13 @@ def check_controller(
     boxes = options.boxes(sandbox, limits, trust)
     if boxes is not None and over is not None:
         raise InputError("drives over a transport", file="--sandbox", value=over.value, expected="no --over")
+    if robust and over is not None:
+        raise InputError(
+            "drives over a transport", file="--robustness", value=over.value, expected="no --over"
+        )
+    if robust:
+        _tabulate(dressed(controller, sandbox=boxes), json=json)
+        return
     found = check(dressed(controller, sandbox=boxes), None if over is None else over.value)
     if json:
         print(json_text.dumps(found.to_json(), indent=2))
@@ -70,6 +86,40 @@ def check_controller(
         _show(found)
     if not found.passed:
         raise typer.Exit(faults.FAILED)
+
+
+def _tabulate(controller: str, *, json: bool) -> None:
+    """Print how the controller drives with disturbances: a table for each share of lost commands."""
+    from rich.console import Console
+    from rich.table import Table
+
+    from dubins_traffic.checkup.robustness import DELAYS, LOSSES, NOISES, robustness
+    from dubins_traffic.cli.progress import progress
+
+    with progress() as tell:
+        found = robustness(
+            controller,
+            workers=os.cpu_count() or 1,
+            delays=DELAYS,
+            noises=NOISES,
+            losses=LOSSES,
+            progress=tell,
+        )
+    if json:
+        print(json_text.dumps(found.to_json(), indent=2))
+        return
+    console = Console(highlight=False)
+    console.print("Clean trials (counted rounds), by the noise of the poses that it sees:")
+    for loss in LOSSES:
+        table = Table(title=f"{loss:.0%} of commands lost")
+        table.add_column("late by")
+        for noise in NOISES:
+            table.add_column(f"{noise * 1e3:g} mm", justify="right")
+        for delay in DELAYS:
+            cells = [found.cell(delay, noise, loss) for noise in NOISES]
+            texts = [f"{own.clean}/{own.trials} ({own.counted_rounds})" for own in cells]
+            table.add_row(f"{delay} tick" + "s" * (delay != 1), *texts)
+        console.print(table)
 
 
 def _show(found: Checkup) -> None:
