@@ -70,12 +70,9 @@ def check_controller(
     from dubins_traffic.controllers.registry import dressed
 
     boxes = options.boxes(sandbox, limits, trust)
-    if boxes is not None and over is not None:
-        raise InputError("drives over a transport", file="--sandbox", value=over.value, expected="no --over")
-    if robust and over is not None:
-        raise InputError(
-            "drives over a transport", file="--robustness", value=over.value, expected="no --over"
-        )
+    for option, given in (("--sandbox", boxes is not None), ("--robustness", robust)):
+        if given and over is not None:
+            raise InputError("drives over a transport", file=option, value=over.value, expected="no --over")
     if robust:
         _tabulate(dressed(controller, sandbox=boxes), json=json)
         return

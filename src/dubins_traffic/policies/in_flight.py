@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING
 
 from dubins_traffic.cars.state import Command, Observation, Pose, Propositions, Twist
 from dubins_traffic.kernels.trig import advance
+from dubins_traffic.rules.breaches import FIRST_AND_CLEAR, lasted, run
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.rules.tables import ticks
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
-
-NEVER = -1
 
 
 class InFlight:
@@ -34,7 +33,7 @@ class InFlight:
         self._period = problem.period
         self._settles = ticks(rules.group_time, problem.rate)
         self._lasts = ticks(rules.forfeit_time, problem.rate) - problem.command_delay - 1
-        self._first_since = self._free_since = NEVER
+        self._first_since = self._clear_since = -1
 
     def ahead(self, seen: Observation) -> Observation:
         """Return what is seen with the ego where it will be when the next command takes effect."""
@@ -55,10 +54,10 @@ class InFlight:
 
     def _settled(self, tick: int, seen: Propositions) -> Propositions:
         """Return propositions in which the ego is first only if that lasts until the command takes effect."""
-        first, free = seen.bits & FLAG.FIRST != 0, seen.bits & FLAG.CLEAR != 0
-        self._first_since = NEVER if not first else tick if self._first_since == NEVER else self._first_since
-        goes = first and free
-        self._free_since = NEVER if not goes else tick if self._free_since == NEVER else self._free_since
-        if not first or (tick - self._first_since >= self._settles and tick - self._free_since < self._lasts):
+        first = seen.bits & FLAG.FIRST != 0
+        self._first_since = run(first, tick, self._first_since)
+        self._clear_since = run(seen.bits & FIRST_AND_CLEAR == FIRST_AND_CLEAR, tick, self._clear_since)
+        settled = lasted(tick, self._first_since) >= self._settles
+        if not first or (settled and lasted(tick, self._clear_since) < self._lasts):
             return seen
         return seen._replace(bits=seen.bits & ~FLAG.FIRST | FLAG.AHEAD)

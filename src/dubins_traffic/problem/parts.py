@@ -77,7 +77,8 @@ class Disturbances(Strict):
         description="standard deviation of the observed position, m; draws are cut at three of them",
     )
     heading_noise: Annotated[float, Field(ge=0, le=10)] = Field(
-        default=0.0, description="the same of the observed heading, rad"
+        default=0.0,
+        description="standard deviation of the observed heading, rad; draws are cut at three of them",
     )
     command_delay: Annotated[int, Field(ge=0, le=limits.DELAY)] = Field(
         default=0, description="ticks by which commands take effect late"
