@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.table import Row
+from dubins_traffic.animation.canvas import Canvas
 from dubins_traffic.animation.raster import Raster
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.problem.configuration import load_config
@@ -23,7 +24,6 @@ from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.viewer import palette
 from dubins_traffic.viewer.bodies import nose, outline
-from dubins_traffic.viewer.canvas import Canvas
 
 SIDE, CARS, FRAMES, PLOTTED, ROUNDS = 400, 8, 2000, 20, 5
 LEAST, TIMES = 2000.0, 10.0

@@ -15,6 +15,7 @@ from typing import Final
 from dubins_traffic.errors import InputError
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.problem.obstructions import check_obstructions
+from dubins_traffic.problem.parts import Disturbances
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.judging import Judging
@@ -59,9 +60,13 @@ def is_admitted(problem: Problem) -> bool:
     return True
 
 
-def trial(name: str, number: int, seconds: float | None = None) -> Came:
-    """Run scene `name`, variation `number`, for as long as its bars need, or for `seconds`."""
+def trial(
+    name: str, number: int, seconds: float | None = None, disturbances: Disturbances | None = None
+) -> Came:
+    """Run scene `name`, variation `number`, for as long as its bars need, or for `seconds`, perhaps disturbed."""
     instance, controller = SCENES[name](number)
+    if disturbances is not None:
+        instance = replace(instance, disturbances=disturbances)
     if seconds is not None:
         instance = replace(instance, duration=seconds)
     times = Judging()

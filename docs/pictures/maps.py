@@ -8,12 +8,12 @@ from __future__ import annotations
 from argparse import ArgumentParser
 from pathlib import Path
 
+from dubins_traffic.animation.plot import write_plot
 from dubins_traffic.maps.foreign import ForeignFormat
 from dubins_traffic.maps.loss_picture import write_losses
 from dubins_traffic.roads.formats import registry
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.viewer.plot import write_plot
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parents[1] / "examples" / "maps"

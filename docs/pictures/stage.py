@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 
+from dubins_traffic.animation.canvas import Canvas
 from dubins_traffic.cars.body import Car
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.files import replace_file
@@ -19,8 +20,7 @@ from dubins_traffic.problem.instance import EAgent, Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.viewer import palette, shapes
-from dubins_traffic.viewer.canvas import METADATA, Canvas
-from dubins_traffic.viewer.plot import STYLE
+from dubins_traffic.viewer.figures import METADATA, STYLE
 from dubins_traffic.viewer.scene import Extent
 
 Point = tuple[float, float]

@@ -16,6 +16,7 @@ if TYPE_CHECKING:  # without the module `typing`: the program `dubins-traffic` h
     from typing import Any
 
     from dubins_traffic.animation.animate import Animation, animate
+    from dubins_traffic.animation.plot import plot, write_plot
     from dubins_traffic.campaign.results import CampaignResults, load_results
     from dubins_traffic.campaign.run_campaign import run_campaign
     from dubins_traffic.cars.body import Bounds, Car, Disc, DiscObstacle, PolygonObstacle, Rectangle
@@ -56,7 +57,6 @@ if TYPE_CHECKING:  # without the module `typing`: the program `dubins-traffic` h
     from dubins_traffic.scoring.verdict import Verdict
     from dubins_traffic.verification.result import Difference, Verification
     from dubins_traffic.verification.verify import verify
-    from dubins_traffic.viewer.plot import plot, write_plot
     from dubins_traffic.viewer.replay import write_replay
 
 _PLACES = {
@@ -101,7 +101,7 @@ _PLACES = {
     "verification.result": ("Difference", "Verification"),
     "verification.verify": ("verify",),
     "animation.animate": ("Animation", "animate"),
-    "viewer.plot": ("plot", "write_plot"),
+    "animation.plot": ("plot", "write_plot"),
     "viewer.replay": ("write_replay",),
 }
 _PARTS = {

@@ -19,7 +19,7 @@ from tests.architecture.traced import CALLS, traced
 MOST_RETURNS = 3
 """So many pairs of rooms may there be of which the lower one calls the higher one."""
 REASONS = {
-    "agents": ("drive the e-agents", "fleet free kernel lawful tables"),
+    "agents": ("drive the e-agents", "fleet free kernel late lawful tables"),
     "campaign": ("says what many trials say together", "notice"),
     "cars": (
         "have bodies that move, touch and see",

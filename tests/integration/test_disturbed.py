@@ -3,24 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from experiments.disturbed import CONTROLLERS, Drive, driven
+from experiments.disturbed import CONTROLLERS, Drive, driven, provoked
 
 from dubins_traffic.cars.state import Command, Observation, Pose, Propositions, Twist
 from dubins_traffic.controllers.rules import Rules
 from dubins_traffic.controllers.shield import Shield
+from dubins_traffic.envs.single import TrafficEnv
+from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.in_flight import InFlight
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.instance import Problem
+from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.problem.parts import Disturbances
 from dubins_traffic.problem.public_problem import problem_from_document, problem_to_document
 from dubins_traffic.rules.propositions import FLAG
-from dubins_traffic.runs.single import run_trial
+from dubins_traffic.runs.single import Trial, run_trial
+from dubins_traffic.runs.sources import load_record
+from dubins_traffic.verification.resimulate import trial_difference
+from tests.contract_provoking import PROVOKING
+from tests.contract_scenes import trial
 
 
 def problem(**disturbances: float) -> Problem:
@@ -37,8 +44,9 @@ def seen(tick: int, bits: int = 0) -> Observation:
 @pytest.mark.parametrize("controller", CONTROLLERS)
 def test_drivers_keep_the_rules_with_late_commands_and_noise(controller: str, delay: int) -> None:
     trials = [driven(Drive(controller, delay, number)) for number in (43, 51, 182, 188)]
-    assert [one.broken for one in trials] == [()] * 4
-    assert sum(one.rounds for one in trials) >= 4
+    trials += [driven(Drive(controller, delay, number, "all")) for number in (3, 44)]
+    assert [one.broken for one in trials] == [()] * 6
+    assert sum(one.rounds for one in trials) >= 6
 
 
 def test_a_delay_that_nobody_counts_in_breaks_rules() -> None:
@@ -118,3 +126,55 @@ def test_the_shield_tells_what_it_wraps_of_no_delay() -> None:
     poses = np.array(told[1:])
     assert poses.shape == (30, 4)
     assert np.hypot(*(poses[10, :2] - np.array(instance.starts[0][:2]))) > np.float64(0.0)
+
+
+def all_late(delay: int) -> Instance:
+    disturbed = Disturbances(command_delay=delay, position_noise=0.005, cars="all")
+    return replace(draw(load_config("town"), 7, 1), disturbances=disturbed, duration=10.0)
+
+
+def test_e_agents_stand_until_their_first_commands_take_effect(tmp_path: Path) -> None:
+    run_trial(all_late(3), "rules", record=tmp_path / "late.mcap", sketch=False)
+    record = load_record(tmp_path / "late.mcap")
+    speeds = np.abs(record.frames.command_speed[1:, 1:])
+    assert not speeds[:3].any()
+    assert speeds[3:].any()
+    assert trial_difference(record) is None
+
+
+def test_a_fork_draws_other_noise() -> None:
+    trial = Trial(all_late(1))
+    for _ in range(30):
+        trial.advance((0.0, 0.0))
+    same, other = trial.fork(), trial.fork(seed=99)
+    for one in (trial, same, other):
+        for _ in range(90):
+            one.advance((0.0, 0.0))
+    mine, its, others = (
+        np.array([own.pose for own in one.observation.others]) for one in (trial, same, other)
+    )
+    assert np.array_equal(mine, its)
+    assert not np.array_equal(mine, others)
+
+
+@pytest.mark.parametrize(("number", "delay"), [(5, 3), (0, 2), (2, 1)])
+def test_e_agents_are_refused_what_they_cannot_foresee(number: int, delay: int) -> None:
+    """Long rectangles at 30 Hz, discs at 10 Hz, short rectangles at 10 Hz."""
+    late = Disturbances(command_delay=delay, position_noise=0.005, cars="all")
+    with pytest.raises(InputError, match="others may get too far") as refused:
+        trial("ego_holds", number, 1.0, late)
+    assert refused.value.field == "disturbances"
+    assert not trial("ego_holds", number, 30.0, late.model_copy(update={"command_delay": delay - 1})).others
+
+
+@pytest.mark.parametrize("place", range(0, len(PROVOKING), 3))
+def test_late_cars_are_provoked_by_no_clean_ego(place: int) -> None:
+    name = list(PROVOKING)[place]
+    came = [provoked((name, number, 2)) for number in (1, 3, 13)]
+    assert [one.others for one in came if one is not None and not one.own] in ([()], [()] * 2, [()] * 3)
+
+
+def test_no_environment_has_late_e_agents() -> None:
+    document = {**load_config("town").document, "disturbances": {"command_delay": 1, "cars": "all"}}
+    with pytest.raises(InputError, match="environment"):
+        TrafficEnv(load_config(document))

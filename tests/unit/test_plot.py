@@ -12,14 +12,14 @@ import pytest
 from PIL import Image
 from shapely import MultiLineString
 
+from dubins_traffic.animation.canvas import MARGIN
+from dubins_traffic.animation.plot import write_plot
 from dubins_traffic.errors import InputError, MissingExtraError
 from dubins_traffic.record.reader import Record
 from dubins_traffic.record.sink import End, Ending
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.canvas import MARGIN
-from dubins_traffic.viewer.plot import write_plot
 from dubins_traffic.viewer.scene import centre_lines, centre_paths, short
 from dubins_traffic.viewer.shapes import KERB
 from tests.synthetic import ROUGH, driven, instance, obstacles_beside

@@ -209,7 +209,7 @@ def test_refusals(tmp_path: Path) -> None:
 
 def test_neither_compiler_nor_matplotlib_is_loaded() -> None:
     code = (
-        "import sys, dubins_traffic.viewer.replay, dubins_traffic.viewer.plot;"
+        "import sys, dubins_traffic.viewer.replay, dubins_traffic.animation.plot;"
         "print([name for name in ('numba', 'matplotlib', 'pandas') if name in sys.modules])"
     )
     assert (

@@ -8,13 +8,13 @@ import re
 import numpy as np
 import pytest
 
+from dubins_traffic.animation.canvas import Canvas
 from dubins_traffic.animation.raster import Raster
 from dubins_traffic.animation.raster_ground import rgb
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette, shapes, svg
-from dubins_traffic.viewer.canvas import Canvas
 from dubins_traffic.viewer.marks import Mark
 from dubins_traffic.viewer.replay import replay_page
 from dubins_traffic.viewer.shapes import Circle, Line, Region, Shape, Sign, Text, Width

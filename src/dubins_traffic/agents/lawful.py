@@ -14,7 +14,7 @@ from dubins_traffic.cars.tables import pack_obstacles
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, numbers, stack, table
-from dubins_traffic.policies.rules.fitness import check_fit, check_speeds
+from dubins_traffic.policies.rules.fitness import check_fit, check_foresight, check_speeds
 from dubins_traffic.policies.rules.kept import KeptPath, kept_commands
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import (
@@ -49,6 +49,10 @@ class Lawful:
             [instance.problem.network for instance in instances],
             [instance.problem.car.lane_width for instance in instances],
         )
+        drivers = pack_drivers(instances, cars, net)
+        for b, instance in enumerate(instances):
+            if instance.disturbances.reach_e_agents:
+                check_foresight(instance, drivers.vehicle[b])
         self._decide = bound(decide)
         bodies = pack_obstacles([instance.problem.obstacles for instance in instances])
         self._traffic = Traffic(
@@ -56,7 +60,7 @@ class Lawful:
             Labels.zeros(*state.x.shape),
             roads,
             bodies,
-            pack_drivers(instances, cars, net),
+            drivers,
             scratch(cars, int(np.diff(roads.seg_off).max()), bodies),
         )
 
@@ -152,7 +156,10 @@ def drivers_of(
         net=net,
         seed=np.array([instance.seed for instance in instances], dtype=np.uint64),
         trial=np.array([instance.trial for instance in instances], dtype=np.int64),
-        vehicle=vehicles_of([instance.problem for instance in instances]),
+        vehicle=vehicles_of(
+            [instance.problem for instance in instances],
+            [instance.disturbances.reach_e_agents for instance in instances],
+        ),
         car=cars,
         way=table(KeptPath, cars.shape),
         command=kept_commands(*cars.shape),

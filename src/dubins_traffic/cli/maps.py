@@ -128,7 +128,7 @@ def _require(outputs: list[str], *others: str | None, overwrite: bool) -> None:
         return
 
     from dubins_traffic.problem.files import DOCUMENTS
-    from dubins_traffic.viewer.plot import require_picture
+    from dubins_traffic.viewer.figures import require_picture
 
     for number, output in enumerate(outputs):
         apart_from = [*others, *outputs[:number]]

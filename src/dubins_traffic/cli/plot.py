@@ -36,9 +36,10 @@ def plot(
     overwrite: options.Replace = False,
 ) -> None:
     """Draw a network, an instance or a recorded trial."""
+    from dubins_traffic.animation.plot import write_plot
     from dubins_traffic.problem.configuration import Configuration
     from dubins_traffic.runs.sources import load
-    from dubins_traffic.viewer.plot import require_picture, write_plot
+    from dubins_traffic.viewer.figures import require_picture
 
     output = output or options.beside(file, ".png")
     require_picture(output, overwrite=overwrite, apart_from=[file])

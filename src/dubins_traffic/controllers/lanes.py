@@ -125,7 +125,7 @@ class Lanes:
 
     def _furnish(self, pose: Pose) -> Knowledge:
         problem = self._problem
-        vehicle = vehicles_of([problem], disturbed=True)[0]
+        vehicle = vehicles_of([problem], [True])[0]
         manner = table(Manner, 1)[0]
         manner.follow = max(FOLLOW, 2.0 * vehicle.reach + 0.5)
         others = len(problem.e_agents)

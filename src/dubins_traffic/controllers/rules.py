@@ -67,7 +67,7 @@ class Rules:
             net=np.zeros(1, dtype=np.int64),
             seed=np.zeros(1, dtype=np.uint64),
             trial=np.zeros(1, dtype=np.int64),
-            vehicle=vehicles_of([problem], disturbed=True),
+            vehicle=vehicles_of([problem], [True]),
             car=rows,
             way=table(KeptPath, (1, cars)),
             command=kept_commands(1, cars),

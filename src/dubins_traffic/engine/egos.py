@@ -221,6 +221,7 @@ def can_share(instance: Instance) -> bool:
     """
     apart = any(agent.kind in ALONE for agent in instance.e_agents)
     unjudged = not instance.problem.rules and any(agent.kind == FREE for agent in instance.e_agents)
+    apart = apart or instance.disturbances.reach_e_agents
     plain = instance.simulator == "embedded" and instance.problem.car.model == DUBINS
     return plain and not instance.problem.formulas and not apart and not unjudged
 

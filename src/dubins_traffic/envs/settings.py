@@ -139,7 +139,7 @@ class Settings:
         (sample,) = episodes.draw([(0, 0, 0)])
         require_dubins(sample.problem.car, "environments move cars together, which is")
         if not can_share(sample):
-            expected = "the embedded simulator, no formulas, no remote cars"
+            expected = "the embedded simulator, no formulas, no remote cars, disturbances of the ego alone"
             raise InputError(
                 "can't be an environment", file=configuration.file, value=sample.simulator, expected=expected
             )

@@ -348,7 +348,8 @@ def beginner(controller: str | Maker, rule: str) -> Begin:
         if not all(map(can_share, instances)) or len(grouped(instances)) != 1:
             raise InputError(
                 "trials that can't be stepped together", field="e-agents", value=instances[0].problem.e_agents,
-                expected="the embedded simulator, no formulas, no cars of one's own or elsewhere, one control rate",
+                expected="the embedded simulator, no formulas, no cars of one's own or elsewhere, disturbances of the "
+                "ego alone, one control rate",
             )  # fmt: skip
         way = Way.COMPILED if len(ways[Way.COMPILED]) == len(instances) else Way.ASKED
         return MeasuredGroup(egos.group(instances, way), rule)

@@ -13,8 +13,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.maps.losses import Fate, Losses, Reason
 from dubins_traffic.maps.polylines import simplified
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.canvas import figure_class
-from dubins_traffic.viewer.plot import write_figure
+from dubins_traffic.viewer.figures import figure_class, write_figure
 
 KEPT, OFF = "kept within the tolerance", "held, but farther off"
 COLOURS: dict[str, str] = {
@@ -51,7 +50,7 @@ def write_losses(path: str | os.PathLike[str], losses: Losses, *, overwrite: boo
     Raises
     ------
     InputError
-        As `viewer.plot.write_plot`.
+        As `animation.plot.write_plot`.
     MissingExtraError
         If matplotlib is not installed.
     """

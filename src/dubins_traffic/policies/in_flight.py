@@ -1,11 +1,12 @@
-"""Commands that come late: what an ego's driver sees when the command that it gives now takes effect."""
+"""Commands that come late: what a driver sees when the command that it gives now takes effect."""
 
 from __future__ import annotations
 
 from collections import deque
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from dubins_traffic.cars.state import Command, Observation, Pose, Propositions, Twist
+from dubins_traffic.kernels.compile import jit_inline
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.rules.breaches import FIRST_AND_CLEAR, lasted, run
 from dubins_traffic.rules.parameters import RuleParameters
@@ -16,6 +17,41 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
 
+class Patience(NamedTuple):
+    """For how many ticks a car has to be first before it counts as first, and may be without a move at most."""
+
+    settles: int
+    lasts: int
+
+    @classmethod
+    def of(cls, problem: Problem, delay: int) -> Patience:
+        """Return the patience of a car whose commands take effect `delay` ticks late."""
+        rules = RuleParameters.from_mapping(problem.rules)
+        return cls(ticks(rules.group_time, problem.rate), ticks(rules.forfeit_time, problem.rate) - delay - 1)
+
+
+@jit_inline
+def settle(
+    bits: Any, tick: int, first_since: int, clear_since: int, patience: Patience
+) -> tuple[Any, int, int]:
+    """Return flags in which a car is first only if that lasts until its next command takes effect.
+
+    With them come the ticks since which it is first, and first at a clear crossing, -1 if it is not; `first_since` and
+    `clear_since` (index) are these before frame `tick`.
+
+    Notes
+    -----
+    Who stops within `group_time` of the car may come before it, and the car forfeits its place after `forfeit_time`.
+    """
+    first = bits & FLAG.FIRST != 0
+    first_since = run(first, tick, first_since)
+    clear_since = run(bits & FIRST_AND_CLEAR == FIRST_AND_CLEAR, tick, clear_since)
+    settled = lasted(tick, first_since) >= patience.settles
+    if first and not (settled and lasted(tick, clear_since) < patience.lasts):
+        bits = bits & ~FLAG.FIRST | FLAG.AHEAD
+    return bits, first_since, clear_since
+
+
 class InFlight:
     """The ego's commands that have not taken effect yet (`Problem.command_delay`).
 
@@ -23,16 +59,13 @@ class InFlight:
     -----
     Where these commands take the ego is known to the bit, unless its observations are noisy or commands get lost. What
     the others do meanwhile is not: `policies.safety.travel_of` counts how far they can get. The order of arrival may
-    change as well: who stops within `group_time` of the ego may come before it, and the ego forfeits its place after
-    `forfeit_time`. So its place counts as the first only if it still is when the command takes effect.
+    change as well (`settle`).
     """
 
     def __init__(self, problem: Problem) -> None:
-        rules = RuleParameters.from_mapping(problem.rules)
         self._under_way = deque([Command(0.0, 0.0)] * problem.command_delay)
         self._period = problem.period
-        self._settles = ticks(rules.group_time, problem.rate)
-        self._lasts = ticks(rules.forfeit_time, problem.rate) - problem.command_delay - 1
+        self._patience = Patience.of(problem, problem.command_delay)
         self._first_since = self._clear_since = -1
 
     def ahead(self, seen: Observation) -> Observation:
@@ -53,11 +86,7 @@ class InFlight:
         return command
 
     def _settled(self, tick: int, seen: Propositions) -> Propositions:
-        """Return propositions in which the ego is first only if that lasts until the command takes effect."""
-        first = seen.bits & FLAG.FIRST != 0
-        self._first_since = run(first, tick, self._first_since)
-        self._clear_since = run(seen.bits & FIRST_AND_CLEAR == FIRST_AND_CLEAR, tick, self._clear_since)
-        settled = lasted(tick, self._first_since) >= self._settles
-        if not first or (settled and lasted(tick, self._clear_since) < self._lasts):
-            return seen
-        return seen._replace(bits=seen.bits & ~FLAG.FIRST | FLAG.AHEAD)
+        bits, self._first_since, self._clear_since = settle(
+            seen.bits, tick, self._first_since, self._clear_since, self._patience
+        )
+        return seen._replace(bits=bits)

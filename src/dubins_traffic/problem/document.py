@@ -69,7 +69,7 @@ def instance_to_document(instance: Instance, version: int = 1) -> dict[str, Any]
         "laser": problem.laser.model_dump() if problem.laser else None,
         "obstacles": [ObstacleModel.document(obstacle) for obstacle in problem.obstacles],
         "rules": dict(problem.rules) or False,
-        "disturbances": instance.disturbances.model_dump(),
+        "disturbances": instance.disturbances.document(),
         "end_on_collision": instance.end_on_collision,
         "simulator": instance.simulator,
         **({"formulas": dict(problem.formulas)} if problem.formulas else {}),

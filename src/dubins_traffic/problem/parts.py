@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import (
     AfterValidator,
@@ -70,7 +70,7 @@ class Laser(Strict):
 
 
 class Disturbances(Strict):
-    """Seeded disturbances of the ego."""
+    """Seeded disturbances, of the ego or of all cars that a trial drives itself; only commands of the ego get lost."""
 
     position_noise: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
         default=0.0,
@@ -86,6 +86,19 @@ class Disturbances(Strict):
     command_loss: Annotated[float, Field(ge=0, le=1)] = Field(
         default=0.0, description="probability that a command is lost and the last one stays in force"
     )
+    cars: Literal["ego", "all"] = Field(
+        default="ego",
+        description="whose commands are late and who sees noisy poses: the ego, or e-agents too",
+    )
+
+    def document(self) -> dict[str, Any]:
+        """Return the document; it says whose they are only if e-agents have them too."""
+        return self.model_dump(exclude={"cars"} if self.cars == "ego" else None)
+
+    @property
+    def reach_e_agents(self) -> bool:
+        """Whether e-agents have to reckon with late commands or noisy poses."""
+        return self.cars == "all" and bool(self.command_delay or self.position_noise or self.heading_noise)
 
 
 class DiscModel(Strict):

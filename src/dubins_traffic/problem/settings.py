@@ -255,7 +255,7 @@ class World(Careful):
     obstacles: list[ObstacleModel] = Field(
         default=[], max_length=limits.OBSTACLES, description="static obstacles"
     )
-    disturbances: Disturbances = Field(default=Disturbances(), description="seeded disturbances of the ego")
+    disturbances: Disturbances = Field(default=Disturbances(), description="seeded disturbances")
     end_on_collision: bool = Field(default=False, description="whether a collision of the ego ends the trial")
     rules: Rules = Field(default=None, description="rules to judge; true: with all defaults")
     formulas: Formulas = Field(

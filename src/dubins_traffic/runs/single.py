@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
-from dubins_traffic.agents.fleet import Fleet
+from dubins_traffic.agents.late import fleet_of
 from dubins_traffic.controllers import registry as controllers
 from dubins_traffic.display import Tabulated
 from dubins_traffic.errors import InputError
@@ -167,7 +167,7 @@ def _agents(instance: Instance, link: Link | None) -> Sequence[Driver]:
             value=remote[0].type,
             expected="a built-in type, or a run over a transport, such as dubins-traffic ros1 run",
         )
-    local: list[Driver] = [Fleet()] if len(remote) < len(instance.e_agents) else []
+    local: list[Driver] = [fleet_of(instance)] if len(remote) < len(instance.e_agents) else []
     return local if link is None or not remote else [*local, link.agents()]
 
 

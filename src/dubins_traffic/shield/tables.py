@@ -198,7 +198,7 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
         net=net,
         seed=np.zeros(trials, dtype=np.uint64),
         trial=np.zeros(trials, dtype=np.int64),
-        vehicle=vehicles_of(problems, disturbed=True),
+        vehicle=vehicles_of(problems, [True] * len(problems)),
         car=rows,
         way=table(KeptPath, (trials, cars)),
         command=kept_commands(trials, cars),

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dubins_traffic.agents.fleet import Fleet
+from dubins_traffic.agents.late import fleet_of
 from dubins_traffic.cars.state import EGO, Contact, Event, Frames
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
@@ -51,7 +51,7 @@ def drivers(record: Record) -> Sequence[Driver]:
     """Return the drivers of the e-agents: the trial's own, and for remote cars one that plays the record."""
     agents = record.instance.e_agents
     remote = [n for n, agent in enumerate(agents, start=1) if agent.kind == REMOTE]
-    local: list[Driver] = [Fleet()] if len(remote) < len(agents) else []
+    local: list[Driver] = [fleet_of(record.instance)] if len(remote) < len(agents) else []
     return [*local, Replayed(record.frames, remote)] if remote else local
 
 

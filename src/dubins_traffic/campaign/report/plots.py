@@ -14,8 +14,7 @@ from dubins_traffic.campaign.report.comparison import RANKING, Comparison, Level
 from dubins_traffic.errors import needs
 from dubins_traffic.scoring.metric import Column
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.canvas import METADATA
-from dubins_traffic.viewer.plot import STYLE
+from dubins_traffic.viewer.figures import METADATA, STYLE
 
 GRID_COLOUR = "#E4E6EA"
 DARK: Mapping[str, str] = {

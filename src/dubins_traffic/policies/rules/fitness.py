@@ -10,7 +10,9 @@ from dubins_traffic.cars.body import Disc
 from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.errors import InputError
 from dubins_traffic.policies.rules.abilities import LONGEST_WAY, ROUND, least_speed
+from dubins_traffic.policies.rules.tables import Vehicle
 from dubins_traffic.policies.rules.wide_turns import check_wide_turns
+from dubins_traffic.policies.safety import travel_of
 from dubins_traffic.problem.kinds import COUNTER, KEEP_RULES, parameters_of
 from dubins_traffic.roads.clearance import clearance_faults
 from dubins_traffic.rules.parameters import RuleParameters
@@ -26,6 +28,8 @@ BESIDE = 0.05
 """What a body keeps from the middle of the road, metres, beyond its half width from the middle of its lane."""
 LATE = 1.05
 """Share of the time that E4 allows for a way through a disc that the longest way may be reckoned to take."""
+FORESEEN_DISC, FORESEEN_BOX = 0.62, 0.75
+"""How far another car may get until the tick of a command is over, in units of w: more brings e-agents to breaches."""
 BEGIN, SHARE = 0.2, 0.8
 """Turning round begins this share of R inside the disc, and takes this share of the largest yaw rate."""
 
@@ -91,6 +95,27 @@ def check_speeds(instance: Instance) -> None:
                 value=speed,
                 expected=f"at least {least:.6g} m/s on these roads",
             )
+
+
+def check_foresight(instance: Instance, vehicle: Vehicle) -> None:
+    """Refuse e-agents of ours that can't foresee enough: commands too late, ticks too long, poses too noisy.
+
+    Nobody may be within reach of where a car drives, and there is no room for more between two lanes.
+
+    Raises
+    ------
+    InputError
+        Naming the disturbances.
+    """
+    most = (FORESEEN_DISC if vehicle.half_length == 0.0 else FORESEEN_BOX) * instance.problem.car.w
+    travel = travel_of(vehicle)
+    if travel > most:
+        raise InputError(
+            "others may get too far until commands of e-agents have taken effect: they can't keep the rules so",
+            field="disturbances",
+            value=f"{travel:.3g} m",
+            expected=f"at most {most:.3g} m: a shorter delay, less noise, a higher control rate",
+        )
 
 
 @cache

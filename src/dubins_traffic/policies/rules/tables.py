@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import compress
 from math import sqrt
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
@@ -311,8 +312,8 @@ def scratch(cars: int, segments: int, obstacles: ObstacleTable) -> Scratch:
     )  # fmt: skip
 
 
-def vehicles_of(problems: Sequence[Problem], *, disturbed: bool = False) -> Rows[Vehicle]:
-    """Return `Drivers.vehicle`; those of egos are disturbed: commands take effect late, and poses are noisy."""
+def vehicles_of(problems: Sequence[Problem], disturbed: Sequence[bool] = ()) -> Rows[Vehicle]:
+    """Return `Drivers.vehicle`; those that are `disturbed` reckon with late commands and noisy poses."""
     kinds, index = distinct_problems(problems)
     made: Any = _vehicles_of(kinds)
     rows = made[index]
@@ -321,7 +322,7 @@ def vehicles_of(problems: Sequence[Problem], *, disturbed: bool = False) -> Rows
     )
     least = np.array([least_speed(problems[k]) for k in first])
     rows["dawdle"] = np.maximum(DAWDLE, least)[alike]
-    for own, problem in zip(rows, problems if disturbed else (), strict=False):
+    for own, problem in compress(zip(rows, problems, strict=True), disturbed):
         position, heading = (CUT * noise for noise in problem.pose_noise)
         own.late, own.unsure = problem.command_delay, sqrt(2.0) * position + own.reach * heading
         own.over -= own.unsure

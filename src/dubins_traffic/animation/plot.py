@@ -2,40 +2,27 @@
 
 from __future__ import annotations
 
-import importlib
 import os
-from collections.abc import Callable, Sequence
-from pathlib import Path
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 
+from dubins_traffic.animation.canvas import Canvas
 from dubins_traffic.cars.body import Car
-from dubins_traffic.errors import InputError, needs
-from dubins_traffic.files import replace_file, require_output
+from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer.bodies import poses_at
-from dubins_traffic.viewer.canvas import METADATA, Canvas
+from dubins_traffic.viewer.figures import STYLE, matplotlib, write_figure
 from dubins_traffic.viewer.marks import breach_marks, contact_mark
 from dubins_traffic.viewer.paths import Paths
 from dubins_traffic.viewer.scene import obstacle_points
 
 if TYPE_CHECKING:
     from dubins_traffic.scoring.score import Score
-
-SUFFIXES = (".pdf", ".png", ".svg")
-STYLE: dict[str, Any] = {
-    "svg.hashsalt": "dubins-traffic",
-    "svg.fonttype": "path",
-    "pdf.compression": 6,
-    "font.family": "DejaVu Sans",
-    "path.simplify": True,
-    "savefig.facecolor": "white",
-}
-
 
 Subject: TypeAlias = "RoadNetwork | Instance | Record"
 
@@ -86,7 +73,7 @@ def plot(subject: Subject | Run) -> Any:
     >>> figure.axes[0].set_title("Six intersections").get_text()
     'Six intersections'
     """
-    with _matplotlib().rc_context(STYLE):
+    with matplotlib().rc_context(STYLE):
         return _draw(subject)
 
 
@@ -110,37 +97,6 @@ def write_plot(path: str | os.PathLike[str], subject: Subject | Run, *, overwrit
         If matplotlib is not installed.
     """
     write_figure(path, lambda: _draw(subject), overwrite=overwrite)
-
-
-def write_figure(path: str | os.PathLike[str], draw: Callable[[], Any], *, overwrite: bool = False) -> None:
-    """Write the figure that `draw` returns to `path`; errors as those of `write_plot`."""
-    target = Path(path)
-    require_picture(target, overwrite=overwrite)
-    with _matplotlib().rc_context(STYLE):
-        figure = draw()
-        suffix = target.suffix.lower()
-        look: dict[str, Any] = {"format": suffix[1:], "metadata": METADATA[suffix], "dpi": 160}
-        replace_file(target, lambda draft: figure.savefig(draft, **look))
-
-
-def require_picture(
-    path: str | os.PathLike[str],
-    *,
-    overwrite: bool = False,
-    apart_from: Sequence[str | os.PathLike[str] | None] = (),
-) -> None:
-    """Refuse a path that no picture may be written to (`files.require_output`), and all without matplotlib."""
-    target = Path(path)
-    if target.suffix.lower() not in SUFFIXES:
-        expected = f"a suffix of {', '.join(SUFFIXES)}"
-        raise InputError("not a picture", file=str(path), value=target.suffix, expected=expected)
-    require_output(target, "a picture", SUFFIXES, overwrite=overwrite, apart_from=apart_from)
-    _matplotlib()
-
-
-def _matplotlib() -> Any:
-    with needs("plotting", "plot"):
-        return importlib.import_module("matplotlib")
 
 
 def _draw(subject: Subject | Run) -> Any:

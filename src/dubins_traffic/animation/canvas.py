@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from functools import cache
-from io import BytesIO
 from itertools import groupby
 from typing import Any, cast
 
@@ -16,6 +14,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.viewer import palette, shapes
+from dubins_traffic.viewer.figures import figure_class
 from dubins_traffic.viewer.marks import Mark
 from dubins_traffic.viewer.scene import Extent, extent
 from dubins_traffic.viewer.shapes import Circle, Line, Region, Shape, Sign, Text, Width
@@ -25,26 +24,6 @@ INCHES_PER_METRE = 0.55
 MARGIN = 0.5
 LEGEND_COLUMN = 1.15
 LEGEND_ROW = 0.2
-METADATA: dict[str, dict[str, Any]] = {
-    ".png": {"Software": None},
-    ".svg": {"Date": None, "Creator": None},
-    ".pdf": {"CreationDate": None, "Creator": None, "Producer": None},
-}
-
-
-@cache
-def figure_class() -> Any:
-    """Return Matplotlib's figure as notebooks show it: without `pyplot` they would print its size only."""
-    from matplotlib.figure import Figure
-
-    class Picture(Figure):
-        def _repr_png_(self) -> bytes:
-            stream = BytesIO()
-            drawn: Any = self
-            drawn.savefig(stream, format="png", metadata=METADATA[".png"], dpi=110)
-            return stream.getvalue()
-
-    return Picture
 
 
 class Canvas:
