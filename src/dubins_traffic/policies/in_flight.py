@@ -18,10 +18,12 @@ if TYPE_CHECKING:
 
 
 class Patience(NamedTuple):
-    """For how many ticks a car has to be first before it counts as first, and may be without a move at most."""
+    """How long a car waits for its place to be certain, and for how long it is."""
 
     settles: int
+    """For how many ticks it has to be first before it counts as first."""
     lasts: int
+    """For how many ticks it may be first without a move, at most."""
 
     @classmethod
     def of(cls, problem: Problem, delay: int) -> Patience:
@@ -36,8 +38,8 @@ def settle(
 ) -> tuple[Any, int, int]:
     """Return flags in which a car is first only if that lasts until its next command takes effect.
 
-    With them come the ticks since which it is first, and first at a clear crossing, -1 if it is not; `first_since` and
-    `clear_since` (index) are these before frame `tick`.
+    With its flags, `bits` (count), come the ticks since which it is first, and first at a clear crossing, -1 if it is
+    not; `first_since` (index) and `clear_since` (index) are these before frame `tick`.
 
     Notes
     -----
