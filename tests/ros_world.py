@@ -1,9 +1,16 @@
 """A world of its own: cars as points with a heading, poses at 100 Hz; run by the system's Python.
 
-usage: ros_world.py FAULT NAME x y [NAME x y]...   FAULT after a second of motion: none, freeze, jump, stop.
+usage: ros_world.py FAULT NAME x y heading [NAME x y heading]...
+
+FAULT after a second of motion: none, freeze, jump, stop.
+
+FAULT may be DELAY,NOISE,LOST instead: commands take effect so many seconds late, poses are off by up to so many metres,
+such a share of commands is lost, and poses come at 27 to 33 Hz.
 """
 
+import collections
 import math
+import random
 import sys
 import threading
 import time
@@ -13,17 +20,21 @@ from gazebo_msgs.msg import ModelStates
 from geometry_msgs.msg import Pose, PoseStamped, Twist
 
 fault, rows = sys.argv[1], sys.argv[2:]
-names = rows[::3]
+delay, noise, lost = (float(part) for part in fault.split(",")) if "," in fault else (0.0, 0.0, 0.0)
+dice = random.Random(1)
+late_commands = collections.deque()
+names = rows[::4]
 cars = {
-    name: [float(x), float(y), 0.0, 0.0, 0.0]
-    for name, x, y in zip(names, rows[1::3], rows[2::3], strict=True)
+    name: [float(x), float(y), float(heading), 0.0, 0.0]
+    for name, x, y, heading in zip(names, rows[1::4], rows[2::4], rows[3::4], strict=True)
 }
 lock = threading.Lock()
 
 
 def take(message, name):
     with lock:
-        cars[name][3:] = [message.linear.x, message.angular.z]
+        if dice.random() >= lost:
+            late_commands.append((time.monotonic() + delay, name, [message.linear.x, message.angular.z]))
 
 
 rospy.init_node("world", disable_rosout=True)
@@ -36,6 +47,9 @@ before = time.monotonic()
 while not rospy.is_shutdown():
     step, before = time.monotonic() - before, time.monotonic()
     with lock:
+        while late_commands and late_commands[0][0] <= before:
+            _, name, command = late_commands.popleft()
+            cars[name][3:] = command
         for car in cars.values():
             car[0] += car[3] * math.cos(car[2]) * step
             car[1] += car[3] * math.sin(car[2]) * step
@@ -44,7 +58,10 @@ while not rospy.is_shutdown():
         poses = []
         for x, y, theta, _, _ in cars.values():
             pose = Pose()
-            pose.position.x, pose.position.y = x, y
+            pose.position.x, pose.position.y = (
+                x + dice.uniform(-noise, noise),
+                y + dice.uniform(-noise, noise),
+            )
             pose.orientation.z, pose.orientation.w = math.sin(theta / 2), math.cos(theta / 2)
             poses.append(pose)
     late = moving > 1.0
@@ -55,4 +72,6 @@ while not rospy.is_shutdown():
         out.publish(ModelStates(["ground_plane", *names], [Pose(), *shown], [Twist()] * (1 + len(names))))
     for tracker, pose in zip(trackers, poses, strict=True):
         tracker.publish(PoseStamped(pose=pose))
+    if fault.count(","):
+        pause = 1.0 / dice.uniform(27.0, 33.0)
     time.sleep(pause)

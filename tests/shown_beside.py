@@ -96,7 +96,7 @@ def world_of_cars(reader: Reader) -> None:
     """Let cars be somewhere else, on a ROS graph of this test."""
     ros = reader.stack.enter_context(graph(reader.notes))
     reader.around |= {name: ros.environment[name] for name in ros.environment if name.startswith("ROS_")}
-    cars = ("ego", "0", "-0.3", "agent0", "3", "3")
+    cars = ("ego", "0", "-0.3", "0", "agent0", "3", "3", "0")
     ros.start(
         [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", "none", *cars], PYTHONPATH=str(ros.client_messages())
     )

@@ -28,7 +28,19 @@ def _compiled() -> None:
 
 def world(ros: Graph, fault: str) -> None:
     ros.start(
-        [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", fault, "ego", "0", "-0.3", "agent0", "3", "3"],
+        [
+            SYSTEM_PYTHON,
+            ROOT / "tests" / "ros_world.py",
+            fault,
+            "ego",
+            "0",
+            "-0.3",
+            "0",
+            "agent0",
+            "3",
+            "3",
+            "0",
+        ],
         PYTHONPATH=str(ros.client_messages()),
     )
 
@@ -46,6 +58,7 @@ def run(ros: Graph, folder: Path, fault: str, **more: object) -> dt.Record:
     ]
     status, _, err = finish(ros.session(configuration(folder, **{**COURSE, **more}), *options))
     assert status in (0, 1), err
+    (folder / "said").write_text(err)
     found = dt.verify(records / "trial-0000.mcap")
     assert found.verified, found
     assert found.world == "ros1-world"
@@ -104,3 +117,28 @@ def test_a_car_that_is_nowhere(tmp_path: Path) -> None:
     assert status == 2
     assert "no pose of agent7" in err
     assert json.loads((tmp_path / "config.json").read_text())["number_trials"] == 1
+
+
+def test_a_world_is_measured_before_its_first_trial(tmp_path: Path) -> None:
+    need_ros()
+    with graph(tmp_path) as ros:
+        record = run(ros, tmp_path, "0.05,0.005,0.0", rules=False, duration=2.0)
+    declared = record.instance.disturbances
+    assert declared.cars == "all"
+    assert 3 <= declared.command_delay <= 6  # 50 ms, and poses up to 37 ms old; more on a busy machine
+    assert 0.001 < declared.position_noise < 0.0025
+    assert "commands take effect late" in (tmp_path / "said").read_text()
+    assert record.instance.problem.command_delay == declared.command_delay
+
+
+def test_a_delay_that_is_declared_is_not_measured(tmp_path: Path) -> None:
+    need_ros()
+    with graph(tmp_path) as ros:
+        world(ros, "none")
+        options = ["--simulator", "ros1-world", "--controller", f"{ROOT}/tests/smooth.py:Smooth"]
+        options += ["--records", str(tmp_path / "out"), "--delay", "0.3", "--noise", "0.03"]
+        status, _, err = finish(ros.session(configuration(tmp_path, **{**COURSE, "duration": 1.0}), *options))
+    assert status in (0, 1), err
+    declared = dt.load_record(tmp_path / "out" / "trial-0000.mcap").instance.disturbances
+    assert declared.command_delay >= 9
+    assert declared.position_noise == pytest.approx(0.01)

@@ -49,20 +49,15 @@ class Outlook(NamedTuple):
 class LateFleet(Fleet):
     """Drives the e-agents of one trial as `Fleet` does, with the trial's delay and noise (`Disturbances.cars`).
 
-    Parameters
-    ----------
-    simulated : bool
-        Whether delay and noise are added here; else the world in which the cars drive has both.
+    Both are added here unless the world has its own (`Instance.added`).
     """
-
-    def __init__(self, *, simulated: bool = True) -> None:
-        self._simulated = simulated
 
     def reset(self, instances: Sequence[Instance], state: State) -> None:
         """Begin the only trial, whose first frame is `state`."""
         (instance,) = instances
         noise, cars = instance.disturbances, len(instance.starts)
-        position, heading = (noise.position_noise, noise.heading_noise) if self._simulated else (0.0, 0.0)
+        self._delays = bool(instance.added.command_delay)
+        position, heading = instance.added.position_noise, instance.added.heading_noise
         patience = Patience.of(instance.problem, noise.command_delay)
         self._outlook = Outlook(
             np.uint64(instance.seed), instance.trial, position, heading, instance.problem.period, patience
@@ -86,14 +81,14 @@ class LateFleet(Fleet):
         delay = seen.under_way.shape[1]
         if delay:
             asked, place = commands[0].copy(), tick % delay
-            if self._simulated:
+            if self._delays:
                 commands[0, EGO + 1 :] = seen.under_way[EGO + 1 :, place]
             seen.under_way[:, place] = asked
 
 
-def fleet_of(instance: Instance, *, simulated: bool = True) -> Fleet:
-    """Return the driver of the e-agents of one trial; `simulated` is as in `LateFleet`."""
-    return LateFleet(simulated=simulated) if instance.disturbances.reach_e_agents else Fleet()
+def fleet_of(instance: Instance) -> Fleet:
+    """Return the driver of the e-agents of one trial."""
+    return LateFleet() if instance.disturbances.reach_e_agents else Fleet()
 
 
 @jit

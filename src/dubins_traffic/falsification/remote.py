@@ -155,7 +155,7 @@ def _seconds(part: str, value: str) -> float:
         raise InputError("not seconds", file="--over", value=part, expected="a number") from None
 
 
-def _value(option: Option, part: str, value: str) -> bool | int | str:
+def _value(option: Option, part: str, value: str) -> bool | float | str:
     """Return the value of an option of a transport."""
     if option.kind is bool:
         if value:
@@ -166,7 +166,7 @@ def _value(option: Option, part: str, value: str) -> bool | int | str:
     low = -(1 << 62) if option.low is None else option.low
     high = 1 << 62 if option.high is None else option.high
     try:
-        number = int(value)
+        number = int(value) if option.kind is int else float(value)
     except ValueError:
         number = low - 1
     if not low <= number <= high:

@@ -60,7 +60,7 @@ class Senses:
         self._rate = problem.rate
         self._view = nothing_seen(len(instance.starts))
         self._seen: list[tuple[str, int, Propositions]] = []
-        noise = instance.disturbances
+        noise = self._noise = instance.added
         self._noisy = car == EGO and (noise.position_noise > 0.0 or noise.heading_noise > 0.0)
         self._laser = laser or problem.laser
         if self._laser is not None:
@@ -79,7 +79,7 @@ class Senses:
             self._seen = self._labelled(count)
         count = len(self._seen)
         if self._noisy:
-            noise = self._instance.disturbances
+            noise = self._noise
             seed, trial = np.uint64(self._instance.seed), self._instance.trial
             blur(self._view, count, seed, trial, tick, noise.position_noise, noise.heading_noise)
         if self._laser is not None:

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.parts import Disturbances, Laser
     from dubins_traffic.roads.network import RoadNetwork
 
+OUTSIDE = frozenset({"ros1-world"})
+"""Worlds outside, whose commands come late and whose poses are noisy of themselves: disturbances describe them."""
 FREE = "free"
 NUDGED = "nudged"
 """The kind of e-agent that does what another kind does, delayed and with noise."""
@@ -157,6 +159,11 @@ class Instance(Pictured):
     def ticks(self) -> int:
         """Number of ticks K = round(duration * rate); the trial has K + 1 frames."""
         return round(self.duration * self.problem.rate)
+
+    @property
+    def added(self) -> Disturbances:
+        """The disturbances that the trial adds to what its world does: a world outside has its own."""
+        return _undisturbed() if self.simulator in OUTSIDE else self.disturbances
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -33,7 +33,7 @@ from dubins_traffic.runs.plan import check_data_file, concluded, load_runnable
 from dubins_traffic.runs.record_folder import Earlier, check_choice, check_folder, claim
 from dubins_traffic.runs.single import Result, run_trial
 from dubins_traffic.scoring.score import ScoreSheet
-from dubins_traffic.sessions.remote import Session, hand_over, quiet, run_remote, run_under
+from dubins_traffic.sessions.remote import Session, hand_over, itself, quiet, run_remote, run_under
 from dubins_traffic.transports.clocks import Lockstep, Patience, RealTime
 from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import ForeignMaestro, Maestro
@@ -119,15 +119,15 @@ class SessionPlan:
         transport: Transport,
         pace: Pace,
         maestro: Maestro | None,
-        world: Callable[[], Simulator] | None = None,
+        world: Callable[[], tuple[Simulator, Callable[[Instance], Instance]]] | None = None,
         at: Callable[[], str] | None = None,
         foreign: ForeignMaestro | None = None,
     ) -> Iterator[Result]:
         """Run the session over `transport`, which is closed in any case; see `remote.run_remote`.
 
-        Once the transport is open, `world` makes the simulator, in place of the one that instances name, and `at`
-        returns a line for people with the transport's address. `foreign`, if given, starts and ends the trials; see
-        `remote.run_under`.
+        Once the transport is open, `world` makes the simulator, in place of the one that instances name, with what
+        describes its disturbances, and `at` returns a line for people with the transport's address. `foreign`, if
+        given, starts and ends the trials; see `remote.run_under`.
         """
         held = ExitStack()
         try:
@@ -137,6 +137,7 @@ class SessionPlan:
             link = Link(transport, pace.clock(), ego=self.controller is None, patience=patience)
             if at is not None:
                 self.say(at())
+            simulator, described = (None, itself) if world is None else world()
             session = Session(
                 link,
                 self.supply,
@@ -146,8 +147,9 @@ class SessionPlan:
                 self.remote,
                 self.records,
                 self.earlier,
-                None if world is None else world(),
+                simulator,
                 self.say,
+                described,
             )
             if foreign is None:
                 yield from run_remote(session)

@@ -23,7 +23,7 @@ class Option:
     flag : str
         The option as it is typed: ``--port``.
     kind : type
-        ``bool``, ``int`` or ``str``.
+        ``bool``, ``int``, ``float`` or ``str``.
     help : str
         One line.
     name : str
@@ -32,20 +32,20 @@ class Option:
         Its value if it is not given.
     metavar : str, optional
         Stands for its value in the help text.
-    low, high : int, optional
+    low, high : number, optional
         Bounds of its value.
     shown : str, optional
         Replaces the default in the help text.
     """
 
     flag: str
-    kind: type[bool] | type[int] | type[str]
+    kind: type[bool] | type[int] | type[float] | type[str]
     help: str
     name: str = ""
     default: bool | int | str | None = None
     metavar: str | None = None
-    low: int | None = None
-    high: int | None = None
+    low: float | None = None
+    high: float | None = None
     shown: str | None = None
 
     @property
@@ -137,6 +137,22 @@ TRANSPORTS: dict[str, TransportEntry] = {
             ),
             Option(
                 "--poses", str, "Of that world: PoseStamped of each car, {} for its name.", metavar="TOPIC"
+            ),
+            Option(
+                "--delay",
+                float,
+                "Of that world: how late commands take effect, seconds.",
+                metavar="S",
+                low=0.0,
+                shown="measured",
+            ),
+            Option(
+                "--noise",
+                float,
+                "Of that world: how far poses are off at most, metres.",
+                metavar="M",
+                low=0.0,
+                shown="measured",
             ),
         ),
         remappings=True,

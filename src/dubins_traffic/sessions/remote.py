@@ -24,6 +24,11 @@ from dubins_traffic.transports.link import Link
 from dubins_traffic.transports.maestro import ForeignMaestro, Maestro, Next, Phase
 
 
+def itself(instance: Instance) -> Instance:
+    """Return an instance as it is: of worlds that have no disturbances of their own."""
+    return instance
+
+
 def quiet(_line: str) -> None:
     """Do nothing: for sessions without lines for people."""
 
@@ -52,6 +57,9 @@ class Session:
     """Replaces the simulator that instances name."""
     say: Callable[[str], None] = quiet
     """Called with lines for people on what the session does and waits for."""
+
+    described: Callable[[Instance], Instance] = itself
+    """Returns an instance with the disturbances of a world outside."""
 
     def which(self, instance: Instance, done: int) -> str:
         """Return the words for the trial of `instance`, which follows `done` others."""
@@ -86,7 +94,7 @@ def _trials(session: Session) -> Iterator[Result]:
         if instance is None:
             number = next(later for later in count(number + 1) if later not in earlier.over)
             repetition = earlier.runs.get(number, 0)
-            instance = hand_over(session.supply(number), session.remote)
+            instance = session.described(hand_over(session.supply(number), session.remote))
         which = session.which(instance, done)
         asked, instance = _await_start(session, instance, which)
         if asked is Next.DRAW:
@@ -221,7 +229,7 @@ def run_under(session: Session, maestro: ForeignMaestro, shortest: float) -> Ite
     link.mark = lambda _running: _look(link, maestro)
     done = 0
     while session.trials is None or done < session.trials:
-        drawn = hand_over(session.supply(done), session.remote)
+        drawn = session.described(hand_over(session.supply(done), session.remote))
         instance = _await_problem(session, maestro, drawn, session.which(drawn, done))
         session.say(f"{session.which(instance, done)}: begins")
         kept = _KeptFrames()

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 
 from dubins_traffic.errors import InputError
+from dubins_traffic.problem.instance import Instance
 from dubins_traffic.runs.plan import check_simulator
 from dubins_traffic.runs.single import Result
 from dubins_traffic.sessions.plan import Pace, SessionPlan, moved_by
@@ -18,6 +19,7 @@ from dubins_traffic.transports.ros1.external import ExternalWorld
 from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.node import leave
 from dubins_traffic.transports.ros1.transport import Ros1, SessionParameters
+from dubins_traffic.transports.tracked import Measured
 
 DEFAULT_URI = "http://localhost:11311/"
 
@@ -32,6 +34,8 @@ def run_over_ros1(
     clock: bool = False,
     simulator: str | None = None,
     poses: str | None = None,
+    delay: float | None = None,
+    noise: float | None = None,
 ) -> Iterator[Result]:
     """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
@@ -49,6 +53,9 @@ def run_over_ros1(
         What moves the cars, whatever the source says; ``ros1-world``: they are somewhere in the graph, in real time.
     poses : str, optional
         Of such a world: the topic of each car's pose, ``{}`` in place of its name.
+    delay, noise : float, optional
+        Of such a world: how late commands take effect, seconds, and how far poses are off at most, metres; by default
+        both are measured before the first trial.
 
     Raises
     ------
@@ -60,8 +67,9 @@ def run_over_ros1(
         If an instance can't be drawn.
     """
     world = simulator == WORLD
-    if poses is not None and not world:
-        raise InputError("is of another world", file="--poses", value=poses, expected=f"--simulator {WORLD}")
+    for option, value in (("--poses", poses), ("--delay", delay), ("--noise", noise)):
+        if value is not None and not world:
+            raise InputError("is of another world", file=option, value=value, expected=f"--simulator {WORLD}")
     if world and (pace.lockstep or clock or pace.factor != 1.0):
         expected = "neither --lockstep nor --clock nor --factor"
         raise InputError("a world outside has its own time", file="--simulator", expected=expected)
@@ -103,12 +111,28 @@ def run_over_ros1(
         if not world:
             yield from session_plan.run(transport, pace, maestro, foreign=foreign)
             return
-        make = partial(_elsewhere, transport, ego, poses)
+        make = partial(_elsewhere, transport, ego, poses, session_plan.say, delay, noise)
         yield from session_plan.run(transport, pace, maestro, make, foreign=foreign)
 
 
-def _elsewhere(transport: Ros1, ego: bool, poses: str | None) -> ExternalWorld:
-    return ExternalWorld(transport.rospy, ego=ego, poses=poses)
+def _elsewhere(
+    transport: Ros1, ego: bool, poses: str | None, say: Callable[[str], None], delay: float | None,
+    noise: float | None,
+) -> tuple[ExternalWorld, Callable[[Instance], Instance]]:  # fmt: skip
+    """Return the world outside, and what describes its disturbances: it is measured before the first trial."""
+    world = ExternalWorld(transport.rospy, ego=ego, poses=poses, say=say)
+    known: list[Measured] = []
+
+    def described(instance: Instance) -> Instance:
+        if not known:
+            known.append(world.measure(instance))
+        declared = known[0].disturbances(instance.problem, delay, noise)
+        if len(known) == 1:
+            say(known[0].told(instance.problem, declared))
+            known.append(known[0])
+        return replace(instance, disturbances=declared)
+
+    return world, described
 
 
 def _parameters(session_plan: SessionPlan) -> SessionParameters:

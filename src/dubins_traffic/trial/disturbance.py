@@ -23,7 +23,7 @@ class CommandLine:
     """
 
     def __init__(self, instance: Instance) -> None:
-        disturbances = instance.disturbances
+        disturbances = instance.added
         self._loss = disturbances.command_loss
         self._instance = instance
         self._under_way = deque([(0.0, 0.0)] * disturbances.command_delay)

@@ -9,10 +9,10 @@ import numpy as np
 
 from dubins_traffic.cars.state import Contact, Frames, State
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import OUTSIDE, Instance
 from dubins_traffic.record.reader import Record
 from dubins_traffic.verification.result import Difference
-from dubins_traffic.verification.worlds import MEASURED, Meetings, by_tick, put_frame
+from dubins_traffic.verification.worlds import Meetings, by_tick, put_frame
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +42,7 @@ UNIT: Final = 1e-6
 
 def slack_of(instance: Instance) -> Slack:
     """Return the tolerances for the world of an instance."""
-    return TRACKED if instance.simulator == MEASURED else PHYSICS
+    return TRACKED if instance.simulator in OUTSIDE else PHYSICS
 
 
 def world_difference(record: Record) -> Difference | None:

@@ -60,7 +60,7 @@ def _commands_of_ego(instance: Instance, frames: Frames) -> Sequence[tuple[float
 
     A command that was delayed beyond the end, or lost, has left no trace; in its place stands what makes none.
     """
-    delay = instance.disturbances.command_delay
+    delay = instance.added.command_delay
     rows: list[list[float]] = commands_of(frames)[delay:, EGO].tolist()
     rows += [[0.0, 0.0]] * min(delay, len(frames) - 1)
     return [(speed, yaw_rate) for speed, yaw_rate in rows]

@@ -19,7 +19,7 @@ from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.cars.touching import Bodies, Touching
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.formulas import check_formulas
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import OUTSIDE, Instance
 from dubins_traffic.problem.parts import Disturbances
 from dubins_traffic.protocols import Capabilities, Ending
 from dubins_traffic.record.reader import Record
@@ -95,8 +95,6 @@ ROUNDING: Final = 1e-9
 """Largest difference between commands as clipped here and by the world of another program, m/s and rad/s."""
 OVERLAP: Final = 1e-6
 """Bodies of the embedded simulator that overlap by more than this without a contact have been moved, metres."""
-MEASURED: Final = "ros1-world"
-"""The simulator whose contacts are found from the poses at frames alone."""
 
 
 class Replayed:
@@ -137,7 +135,7 @@ class Shown:
         problem = instance.problem
         cars = len(instance.names)
         self._touching = None
-        if instance.simulator == MEASURED:
+        if instance.simulator in OUTSIDE:
             self._touching = Touching(problem.car, problem.obstacles, problem.period)
         self._rows = rows(pack_cars([problem.car]), cars, problem.period)
         self._asked = np.zeros((2, cars))

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import partial
 from threading import Lock
 from time import monotonic, sleep
@@ -20,11 +20,24 @@ from dubins_traffic.protocols import Capabilities, End
 from dubins_traffic.transports.ros import placed
 from dubins_traffic.transports.ros1.messages import load
 from dubins_traffic.transports.ros1.transport import COMMANDS
+from dubins_traffic.transports.tracked import (
+    RATE,
+    SETTLE,
+    STAND,
+    TURN,
+    LagWatch,
+    Measured,
+    Sample,
+    Turned,
+    measured,
+)  # fmt: skip
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
 
 NAME = "ros1-world"
+TOLD = 0.02
+"""Cars are told what to do again after so many seconds while they are measured."""
 APPEAR = 10.0
 """Seconds within which every car must have been seen."""
 LATE = 0.5
@@ -56,11 +69,15 @@ class ExternalWorld:
     poses : str, optional
         A topic of geometry_msgs/PoseStamped for each car, ``{}`` in place of its name, as trackers publish; by default
         all cars are in `/gazebo/model_states`.
+    say : callable, optional
+        Is told what people should know of the world.
     """
 
     capabilities = Capabilities(batched=False, deterministic=False, lockstep=False)
 
-    def __init__(self, rospy: Any, *, ego: bool, poses: str | None = None) -> None:
+    def __init__(
+        self, rospy: Any, *, ego: bool, poses: str | None = None, say: Callable[[str], None] | None = None
+    ) -> None:
         if poses is not None and "{}" not in poses:
             raise InputError(
                 "not a topic for every car", file="--poses", value=poses, expected="such as /{}/pose"
@@ -70,6 +87,41 @@ class ExternalWorld:
         self._seen: dict[str, _Seen] = {}
         self._subscribers: list[Any] = []
         self._publishers: dict[str, Any] = {}
+        self._samples: dict[str, list[Sample]] | None = None
+        self._say = say
+
+    def measure(self, instance: Instance) -> Measured:
+        """Return how noisy poses are and how late commands take effect: cars that are driven here turn a little.
+
+        Cars that can't turn in place, or that nodes elsewhere drive, tell no delay.
+        """
+        self._instance, bounds = instance, instance.problem.car.bounds
+        self._listen()
+        self._await()
+        standing = self._sampled(0.0, STAND)
+        turns = bounds.turning_radius == 0.0 and bounds.speed_low <= 0.0
+        rate = min(RATE, 0.5 * bounds.yaw_rate) if turns else 0.0
+        told = Turned(monotonic(), 0.0, 0.0, rate)
+        seen = self._sampled(rate, TURN)
+        told = replace(told, back=monotonic())
+        back = self._sampled(-rate, TURN)
+        told = replace(told, stood=monotonic())
+        after = self._sampled(0.0, SETTLE)
+        turning = [seen[name] + back[name] + after[name] for name in self._publishers] if rate else []
+        return measured(list(standing.values()), turning, told)
+
+    def _sampled(self, rate: float, seconds: float) -> dict[str, list[Sample]]:
+        """Tell the cars that are driven here to turn at a rate for a time; return the poses that come meanwhile."""
+        with self._lock:
+            samples = self._samples = {name: [] for name in self._instance.names}
+        until = monotonic() + seconds
+        while monotonic() < until:
+            for name in self._publishers:
+                self._send(name, 0.0, rate)
+            sleep(TOLD)
+        with self._lock:
+            self._samples = None
+        return samples
 
     def reset(self, instances: Sequence[Instance]) -> State:
         """Begin a trial where the cars stand; TransportError if one of them is not seen."""
@@ -83,6 +135,7 @@ class ExternalWorld:
         self._touching = Touching(problem.car, problem.obstacles, problem.period)
         self._tick = 0
         self._driven: dict[int, float] = {}
+        self._watch = LagWatch(len(self._instance.names))
         self._listen()
         self._await()
         self._state = State.zeros(1, len(self._instance.names))
@@ -108,7 +161,24 @@ class ExternalWorld:
                 self._send(name, float(speed[n]), float(yaw_rate[n]))
         self._tick += 1
         self._look(speed)
+        self._notice(speed)
         return [self._touching.update(self._tick, self._state)]
+
+    def _notice(self, speed: Floats) -> None:
+        """Say, once in a session, that commands take effect later than is declared."""
+        self._watch.add(speed, self._state.speed[0])
+        declared = self._instance.disturbances.command_delay
+        if self._say is None or self._tick % int(self._instance.problem.rate):
+            return
+        for n, name in enumerate(self._instance.names):
+            lag = self._watch.lag(n)
+            if lag is not None and lag > declared + 1:
+                self._say(
+                    f"commands of {name} take effect about {lag} ticks late and {declared} are declared: drivers leave "
+                    "too little room, and cars stop too late"
+                )
+                self._say = None
+                return
 
     def close(self) -> None:
         """Stop the cars that are driven here."""
@@ -158,6 +228,8 @@ class ExternalWorld:
             old = self._seen.get(name)
             same = old.same_since if old is not None and old.pose == new else now
             self._seen[name] = _Seen(new, now, same)
+            if self._samples is not None and name in self._samples:
+                self._samples[name].append(Sample(now, new.x, new.y, math.atan2(new.s, new.c)))
 
     def _await(self) -> None:
         until = monotonic() + APPEAR
