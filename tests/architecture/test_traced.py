@@ -50,7 +50,7 @@ REASONS = {
     "runs": ("carries a plan out", "jobs plan processes"),
     "scoring": (
         "counts and says what it means",
-        "counts margins own_metrics registry score tally verdict",
+        "counts margins own_metrics registry score tally tracked verdict",
     ),
     "sessions": ("names the transports of the command's help", "registry"),
     "shield": ("has no car to guard", "tables"),

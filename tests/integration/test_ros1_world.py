@@ -125,7 +125,9 @@ def test_a_world_is_measured_before_its_first_trial(tmp_path: Path) -> None:
         record = run(ros, tmp_path, "0.05,0.005,0.0", rules=False, duration=2.0)
     declared = record.instance.disturbances
     assert declared.cars == "all"
-    assert 3 <= declared.command_delay <= 6  # 50 ms, and poses up to 37 ms old; more on a busy machine
+    assert (
+        3 <= declared.command_delay <= 8
+    )  # 50 ms, poses up to 37 ms old, and a tick; more on a busy machine
     assert 0.001 < declared.position_noise < 0.0025
     assert "commands take effect late" in (tmp_path / "said").read_text()
     assert record.instance.problem.command_delay == declared.command_delay

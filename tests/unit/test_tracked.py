@@ -68,15 +68,15 @@ def test_a_problem_declares_what_was_measured_or_given() -> None:
     problem = dt.draw(dt.load_config("town"), 1, 0).problem
     found = Measured(0.05, 0.012, 0.006, 1.0 / 30.0)
     declared = found.disturbances(problem)
-    assert (declared.command_delay, declared.cars) == (3, "all")  # 50 ms, and poses up to 33 ms old, at 30 Hz
+    assert (declared.command_delay, declared.cars) == (4, "all")  # 50 ms, and poses up to 33 ms old, at 30 Hz
     assert declared.position_noise == pytest.approx(0.004)
     assert declared.heading_noise == pytest.approx(0.002)
-    assert "50 ms; 3 ticks" in found.told(problem, declared)
+    assert "50 ms; 4 ticks" in found.told(problem, declared)
     given_by_user = found.disturbances(problem, 0.1, 0.003)
-    assert given_by_user.command_delay == 4
+    assert given_by_user.command_delay == 5
     assert given_by_user.position_noise == pytest.approx(0.001)
     unknown = Measured(None, 0.0, 0.0, 0.01)
-    assert unknown.disturbances(problem).command_delay == 0
+    assert unknown.disturbances(problem).command_delay == 2
     assert "--delay declares it" in unknown.told(problem, unknown.disturbances(problem))
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import table
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.problem.preconditions import check_demands
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.roads.table import pack
@@ -57,13 +58,7 @@ class Judging:
         self._rules = RuleParameters.from_mapping(problem.rules)
         self._referee = None
         if problem.rules:
-            check_demands(
-                problem.network,
-                problem.intersection_radius,
-                problem.car,
-                problem.sensing_radius,
-                self._rules.to_mapping(),
-            )
+            self._check(problem)
             self._referee = Referee([instance])
         self._only: Ints = np.zeros(1, dtype=np.int64)
         self._counted = Counted(
@@ -84,11 +79,19 @@ class Judging:
         self._seal = NEVER
         self._last = -1
 
+    def _check(self, problem: Problem) -> None:
+        """Refuse roads on which the rules are not defined."""
+        check_demands(
+            problem.network,
+            problem.intersection_radius,
+            problem.car,
+            problem.sensing_radius,
+            self._rules.to_mapping(),
+        )
+
     def frames(self, frames: Frames) -> None:
         """Count and judge a block of frames."""
-        contacts, breaches = frames.contacts, list["Breach"]()
-        if self._referee is not None:
-            breaches, contacts = self._referee.judge(frames)
+        breaches, contacts = self._judged(frames)
         self._breaches += breaches
         self._contacts += contacts
         if not len(frames):
@@ -105,6 +108,10 @@ class Judging:
             if one.car != EGO and seen[one.tick - frames.first, one.car]
         )
         self._last = frames.first + len(frames) - 1
+
+    def _judged(self, frames: Frames) -> tuple[list[Breach], Sequence[Contact]]:
+        """Return the breaches and contacts of a block of frames."""
+        return ([], frames.contacts) if self._referee is None else self._referee.judge(frames)
 
     def _counts(self, frames: Frames) -> Ints:
         """Count a block; return which cars the ego senses in each of its frames, (F, N)."""

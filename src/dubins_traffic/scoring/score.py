@@ -31,6 +31,7 @@ from dubins_traffic.scoring.judging import Judging
 from dubins_traffic.scoring.metric import Measured, MetricSpec
 from dubins_traffic.scoring.own_metrics import OwnMetrics
 from dubins_traffic.scoring.paper import paper_score
+from dubins_traffic.scoring.tracked import Tracked
 from dubins_traffic.scoring.verdict import Ruling, Verdict, is_clean
 
 _BLOCK = 512
@@ -196,11 +197,11 @@ class Scorer:
 
     def __init__(self, metrics: Sequence[MetricSpec] = ()) -> None:
         self._own = OwnMetrics(registry.makers(metrics)) if metrics else None
-        self._judging = Judging()
+        self._judging, self._tracked = Judging(), Tracked()
         self._formulas = FormulaVerdicts()
         self._interventions = Interventions()
         own = [] if self._own is None else [self._own]
-        self._metrics = (self._judging, self._formulas, self._interventions, *own)
+        self._metrics = (self._judging, self._tracked, self._formulas, self._interventions, *own)
 
     def begin(self, instance: Instance) -> None:
         """Start all metrics."""
@@ -239,8 +240,14 @@ class Scorer:
         """
         self._show()
         begin = None if wall is None else wall.time_to_begin_s
+        found = self._tracked.findings() or self._judging.findings()
+        score = score_of(found, controller, begin)
+        verdict = self._tracked.told(score.verdict)
+        if verdict is not None and verdict.verdict is Ruling.UNTOLD:
+            score = replace(score, counted_rounds=0, rounds_before_breach=0.0)
         return replace(
-            score_of(self._judging.findings(), controller, begin),
+            score,
+            verdict=verdict,
             record=None if record is None else str(record),
             formulas=self._formulas.result(),
             interventions=self._interventions.result(),

@@ -43,6 +43,7 @@ class Ruling(StrEnum):
     VIOLATED = "violated"
     EXCUSED = "excused"
     UNFINISHED = "unfinished"
+    UNTOLD = "untold"
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,7 +121,7 @@ class Verdict:
     Attributes
     ----------
     verdict : Ruling
-        Satisfied, violated, excused or unfinished.
+        Satisfied, violated, excused or unfinished; of a world outside perhaps untold.
     clean : bool
         Whether the ego broke nothing in the whole planned duration, whatever others did.
     cut : bool
@@ -143,6 +144,8 @@ class Verdict:
         The verdict on each formula so far, in four values.
     robustness : dict
         Margins of rules 1 and 2, metres (`dubins_traffic.scoring.margins`).
+    tolerance : float or None
+        Of a world outside: how far any point of a car may be from where it was seen, metres.
     """
 
     verdict: Ruling
@@ -158,6 +161,7 @@ class Verdict:
     recurrent: bool
     formulas: dict[str, Status]
     robustness: dict[str, float | None]
+    tolerance: float | None = None
 
     @property
     def assumption_broken(self) -> bool:
@@ -196,6 +200,7 @@ class Verdict:
             "formulas": dict(self.formulas),
             "robustness": dict(self.robustness),
             "edition": EDITION,
+            **({} if self.tolerance is None else {"tolerance": self.tolerance}),
         }
 
 

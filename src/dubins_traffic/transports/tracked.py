@@ -58,10 +58,11 @@ class Measured:
     ) -> Disturbances:
         """Return them as what a problem declares; `delay` (s) and `noise` (m) replace what was measured.
 
-        A pose that is read may be as old as the interval, so this counts as delay.
+        A pose may be as old as the interval when it is read, and it is read a tick before the command that it leads to,
+        so both count as delay.
         """
         late = self.delay if delay is None else delay
-        ticks = 0 if late is None else math.ceil((late + self.interval) * problem.rate - 1e-9)
+        ticks = 1 + math.ceil(((late or 0.0) + self.interval) * problem.rate - 1e-9)
         position = self.position if noise is None else noise
         return Disturbances(
             command_delay=ticks, position_noise=position / CUT, heading_noise=self.heading / CUT, cars="all"

@@ -93,6 +93,9 @@ def breach_text(violation: Violation) -> str:
 def verdict_text(verdict: Verdict) -> str:
     """Return in words why a trial has its verdict: what the ego broke first, and what excused it."""
     own = next((one for one in verdict.violations if one.car == EGO_NAME), None)
+    if verdict.verdict is Ruling.UNTOLD:
+        known = 100.0 * (verdict.tolerance or 0.0)
+        return f"What the ego did can't be told from poses that are known to {known:.1f} cm."
     if own is None and verdict.cut:
         return "The ego broke nothing until the trial was cut short."
     if own is None and not verdict.clean:

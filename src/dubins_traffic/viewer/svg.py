@@ -32,6 +32,7 @@ VERDICT_COLOURS: Mapping[str, str] = {
     "unfinished": "#56B4E9",
     "excused": "#E69F00",
     "violated": palette.CONTACT_COLOUR,
+    "untold": palette.FAINT_COLOUR,
 }
 
 
