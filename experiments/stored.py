@@ -102,7 +102,7 @@ CLAIMS: Mapping[str, Claim] = {
         "some minutes",
     ),
     "disturbed": Claim(
-        "`rules` and the shield keep the rules with commands that come up to three ticks late and 5 mm of noise",
+        "`rules`, the shield and `lawful` cars keep the rules with commands up to three ticks late and 5 mm of noise",
         "shield.md#what-it-does-not-promise",
         "some minutes",
     ),

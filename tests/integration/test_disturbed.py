@@ -1,4 +1,4 @@
-"""Drivers whose commands come late and who see noisy poses; `experiments.disturbed` runs 1,600 trials of them."""
+"""Drivers whose commands come late and who see noisy poses; `experiments.disturbed` runs 3,200 trials of them."""
 
 from __future__ import annotations
 

@@ -62,12 +62,13 @@ def test_who_keeps_the_law_leaves_discs_in_time_beside_an_ego_that_does_as_it_li
 def test_who_keeps_the_law_leaves_in_time_among_many() -> None:
     """Its exit taken late, it turned back across the whole crossing; it stood beside an ego that turned on the spot.
 
-    Or behind one that stood at the outer edge of a bend, or came a little over the line beside its exit.
+    Or behind one that stood at the outer edge of a bend, or came a little over the line beside its exit; or it turned
+    toward its way, which an ego barred.
     """
     found = list(outcomes(cases_in(WIDE), Free))
     assert [own.file.stem for own in found] == [
-        "leaves_a_crossing_late", "leaves_beside_who_comes_over_the_line", "leaves_beside_who_stands_at_the_edge",
-        "leaves_beside_who_turns",
+        "drives_on_in_a_bend_beside_an_ego", "drives_on_where_an_ego_bars_its_line", "leaves_a_crossing_late",
+        "leaves_beside_who_comes_over_the_line", "leaves_beside_who_stands_at_the_edge", "leaves_beside_who_turns",
     ]  # fmt: skip
     assert [own.file.name for own in found if not own.passed] == []
 

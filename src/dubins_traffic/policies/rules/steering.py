@@ -36,8 +36,8 @@ EXACT = 0.9999
 SQUARE = 0.999
 """Sine of the angle at which it does."""
 SLIGHT = 0.1
-"""A car farther left of its way than this, metres, drives on straight where another one bars its way back; and in a
-disc one farther right of it."""
+"""A car farther from its way than this, metres, drives on straight where another one bars its way back: else it would
+turn to it and stand there for good."""
 GAIN = 8.0
 """Yaw rate for each unit of the sine of that angle, 1/s."""
 
@@ -89,7 +89,7 @@ def move(
         safe = is_safe_from(pose, b, Command(allowed, 0.0), near, trusted, traffic, vehicle)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
     slants = outside and offset == 0.0 and left > SLIGHT
-    keeps_out = not outside and offset == 0.0 and left < -SLIGHT
+    keeps_out = not slants and offset == 0.0 and abs(left) > SLIGHT
     if returns and near > 0 and vehicle.tightest == 0.0:
         motion = Motion(speed, yaw_rate, safe)
         speed, yaw_rate, safe = come_back(b, n, motion, Line(left, px, py, allowed), way, near, traffic)
