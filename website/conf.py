@@ -28,7 +28,7 @@ nitpick_ignore_regex = [
     ),
     (
         r"py:class",
-        r"AutoresetMode|Body|Bools|Cancelled|Event|Floats|Image|Levels|Link|MetricSpec|Propositions|Run|Subject",
+        r"AutoresetMode|Body|Bools|Cancelled|Disturbances|Event|Floats|Image|Levels|Link|MetricSpec|Propositions|Run|Subject",
     ),
     (r"py:.*", r"dubins_traffic\.(?!envs)[a-z_]+\..*"),
 ]

@@ -46,6 +46,10 @@ class Ruling(StrEnum):
     UNTOLD = "untold"
 
 
+OF_SIMULATED = tuple(ruling for ruling in Ruling if ruling is not Ruling.UNTOLD)
+"""The rulings on simulated trials: only those of worlds outside can be untold."""
+
+
 @dataclass(frozen=True, slots=True)
 class Place:
     """Where a rule was broken: a point in metres and, if it is about one, an intersection or a directed segment."""

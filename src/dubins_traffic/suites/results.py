@@ -24,7 +24,7 @@ from dubins_traffic.problem.files import parse_json
 from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.release import sources_hash
 from dubins_traffic.scoring.registry import STRATEGY_SHARE
-from dubins_traffic.scoring.verdict import Ruling
+from dubins_traffic.scoring.verdict import OF_SIMULATED
 from dubins_traffic.suites.suite import SHORT, Count, Suite
 
 FORMAT = "dubins-traffic suite results"
@@ -253,7 +253,7 @@ def _check_words(column: str, values: Sequence[Any]) -> None:
     """Refuse a trial that ended in no way at all, or whose verdict is none."""
     wrong = [value for value in values if not _is_word(column, value)]
     if wrong:
-        expected = ", ".join(Ruling) + " or null" if column == "verdict" else "how each trial ended"
+        expected = ", ".join(OF_SIMULATED) + " or null" if column == "verdict" else "how each trial ended"
         raise InputError(
             "a column of other values", field=f"columns.{column}", value=wrong[0], expected=expected
         )
@@ -261,7 +261,7 @@ def _check_words(column: str, values: Sequence[Any]) -> None:
 
 def _is_word(column: str, value: object) -> bool:
     if column == "verdict":
-        return value is None or value in list(Ruling)
+        return value is None or value in OF_SIMULATED
     return column != "end" or (isinstance(value, str) and bool(value))
 
 

@@ -15,7 +15,7 @@ from dubins_traffic.campaign.report.write import csv_files, page
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import make_folder, require_output, write_text
 from dubins_traffic.record.sink import BY_CONTROLLER, FAULTS
-from dubins_traffic.scoring.verdict import Ruling, told_cut, was_cut
+from dubins_traffic.scoring.verdict import OF_SIMULATED, told_cut, was_cut
 from dubins_traffic.suites.results import (
     GameResult,
     Source,
@@ -116,7 +116,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
     metric = SCORES[suite.model.metric].column
     timed = [metric_of_time for metric_of_time in WALL_METRICS if metric_of_time in comparison.metrics]
     judged = any(standing.judged for standing in comparison.standings)
-    verdicts = [ruling.value for ruling in Ruling] if judged else []
+    verdicts = [ruling.value for ruling in OF_SIMULATED] if judged else []
     head = [
         "controller",
         "trials",

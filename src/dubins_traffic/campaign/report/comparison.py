@@ -19,7 +19,7 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.metric import Column
-from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, Ruling, was_cut
+from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, OF_SIMULATED, Ruling, was_cut
 
 CONFIGURATION = "configuration"
 WALL_METRICS = (
@@ -217,7 +217,7 @@ def _standing(
     ends: list[str] = own["end"].to_pylist()
     verdicts: list[str | None] = own["verdict"].to_pylist()
     judged = sum(verdict is not None for verdict in verdicts)
-    seen = [verdict.value for verdict in Ruling]
+    seen = [verdict.value for verdict in OF_SIMULATED]
     nothing = sum(ends.count(end) for end in rows.NOTHING)
     clean: list[bool | None] = own["clean"].to_pylist()
     cut = sum(map(was_cut, verdicts, clean, ends))

@@ -39,7 +39,6 @@ VERDICTS: Mapping[str, str] = {
     "unfinished": "#56B4E9",
     "excused": "#E69F00",
     "violated": palette.CONTACT_COLOUR,
-    "untold": palette.FAINT_COLOUR,
 }
 FAULTS: Mapping[str, str] = {"the ego": palette.CONTACT_COLOUR, "both": "#882255", "the other": "#56B4E9"}
 FORMULA: Mapping[str, str] = {
