@@ -95,6 +95,14 @@ class Graph:
             [SYSTEM_PYTHON, ROOT / "tests" / "ros_client.py", *actions], PYTHONPATH=str(generated)
         )
 
+    def world(self, fault: str = "none") -> subprocess.Popen[str]:
+        """Start the world of tests/ros_world.py, with the ego and a car `agent0`."""
+        cars = ("ego", "0", "-0.3", "0", "agent0", "3", "3", "0")
+        generated = self.client_messages()
+        return self.start(
+            [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", fault, *cars], PYTHONPATH=str(generated)
+        )
+
     def client_messages(self) -> Path:
         """Return where our messages are for the system's Python."""
         generated = self.folder / "messages"

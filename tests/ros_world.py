@@ -20,7 +20,8 @@ from gazebo_msgs.msg import ModelStates
 from geometry_msgs.msg import Pose, PoseStamped, Twist
 
 fault, rows = sys.argv[1], sys.argv[2:]
-delay, noise, lost = (float(part) for part in fault.split(",")) if "," in fault else (0.0, 0.0, 0.0)
+is_disturbed = "," in fault
+delay, noise, lost = (float(part) for part in fault.split(",")) if is_disturbed else (0.0, 0.0, 0.0)
 dice = random.Random(1)
 late_commands = collections.deque()
 names = rows[::4]
@@ -72,6 +73,6 @@ while not rospy.is_shutdown():
         out.publish(ModelStates(["ground_plane", *names], [Pose(), *shown], [Twist()] * (1 + len(names))))
     for tracker, pose in zip(trackers, poses, strict=True):
         tracker.publish(PoseStamped(pose=pose))
-    if fault.count(","):
+    if is_disturbed:
         pause = 1.0 / dice.uniform(27.0, 33.0)
     time.sleep(pause)

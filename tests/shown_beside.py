@@ -12,9 +12,9 @@ from zipfile import ZipFile
 from dubins_traffic.competition.templates import write_template
 from tests.ports import kept_port
 from tests.reader import Reader
-from tests.ros import SYSTEM_PYTHON, graph
+from tests.ros import graph
 from tests.services import serving
-from tests.shown import ROOT, Block
+from tests.shown import Block
 from tests.shown_files import DRIVER
 
 
@@ -96,10 +96,7 @@ def world_of_cars(reader: Reader) -> None:
     """Let cars be somewhere else, on a ROS graph of this test."""
     ros = reader.stack.enter_context(graph(reader.notes))
     reader.around |= {name: ros.environment[name] for name in ros.environment if name.startswith("ROS_")}
-    cars = ("ego", "0", "-0.3", "0", "agent0", "3", "3", "0")
-    ros.start(
-        [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", "none", *cars], PYTHONPATH=str(ros.client_messages())
-    )
+    ros.world()
 
 
 def program(folder: Path) -> None:

@@ -10,7 +10,7 @@ import pytest
 import dubins_traffic as dt
 from dubins_traffic.record.sink import End
 from dubins_traffic.sessions.plan import rehearse
-from tests.ros import ROOT, SYSTEM_PYTHON, Graph, configuration, finish, graph, need_ros
+from tests.ros import ROOT, Graph, configuration, finish, graph, need_ros
 
 pytestmark = pytest.mark.tools
 
@@ -26,27 +26,8 @@ def _compiled() -> None:
     rehearse(dt.draw(dt.load_config("demo")))
 
 
-def world(ros: Graph, fault: str) -> None:
-    ros.start(
-        [
-            SYSTEM_PYTHON,
-            ROOT / "tests" / "ros_world.py",
-            fault,
-            "ego",
-            "0",
-            "-0.3",
-            "0",
-            "agent0",
-            "3",
-            "3",
-            "0",
-        ],
-        PYTHONPATH=str(ros.client_messages()),
-    )
-
-
 def run(ros: Graph, folder: Path, fault: str, **more: object) -> dt.Record:
-    world(ros, fault)
+    ros.world(fault)
     records = folder / "out"
     options = [
         "--simulator",
@@ -83,7 +64,7 @@ def test_cars_elsewhere_are_driven_and_judged_here(tmp_path: Path) -> None:
 def test_a_node_drives_the_ego_and_a_tracker_sees_the_cars(tmp_path: Path) -> None:
     need_ros()
     with graph(tmp_path) as ros:
-        world(ros, "none")
+        ros.world()
         options = ["--simulator", "ros1-world", "--poses", "/tracker/{}", "--records", tmp_path / "out"]
         session = ros.session(configuration(tmp_path, **COURSE), *options)
         status, _, err = finish(ros.client("drive"))
@@ -110,7 +91,7 @@ def test_a_world_that_fails_ends_the_trial_with_its_reason(tmp_path: Path, fault
 def test_a_car_that_is_nowhere(tmp_path: Path) -> None:
     need_ros()
     with graph(tmp_path) as ros:
-        world(ros, "none")
+        ros.world()
         more = {"e-agents": [{"type": "wander", "name": "agent7"}]}
         options = ["--simulator", "ros1-world", "--controller", "simple"]
         status, _, err = finish(ros.session(configuration(tmp_path, **{**COURSE, **more}), *options))
@@ -125,9 +106,8 @@ def test_a_world_is_measured_before_its_first_trial(tmp_path: Path) -> None:
         record = run(ros, tmp_path, "0.05,0.005,0.0", rules=False, duration=2.0)
     declared = record.instance.disturbances
     assert declared.cars == "all"
-    assert (
-        3 <= declared.command_delay <= 8
-    )  # 50 ms, poses up to 37 ms old, and a tick; more on a busy machine
+    # 50 ms, poses up to 37 ms old, and a tick; more on a busy machine.
+    assert 3 <= declared.command_delay <= 8
     assert 0.001 < declared.position_noise < 0.0025
     assert "commands take effect late" in (tmp_path / "said").read_text()
     assert record.instance.problem.command_delay == declared.command_delay
@@ -136,7 +116,7 @@ def test_a_world_is_measured_before_its_first_trial(tmp_path: Path) -> None:
 def test_a_delay_that_is_declared_is_not_measured(tmp_path: Path) -> None:
     need_ros()
     with graph(tmp_path) as ros:
-        world(ros, "none")
+        ros.world()
         options = ["--simulator", "ros1-world", "--controller", f"{ROOT}/tests/smooth.py:Smooth"]
         options += ["--records", str(tmp_path / "out"), "--delay", "0.3", "--noise", "0.03"]
         status, _, err = finish(ros.session(configuration(tmp_path, **{**COURSE, "duration": 1.0}), *options))

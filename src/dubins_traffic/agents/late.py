@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from dubins_traffic.agents.fleet import Fleet
-from dubins_traffic.cars.state import EGO, Labels, State
+from dubins_traffic.cars.sensing import blurred
+from dubins_traffic.cars.state import EGO, Labels, Pose, State
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
-from dubins_traffic.kernels.random import DRAW, cut_bell
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.kernels.trig import advance, sincos
+from dubins_traffic.kernels.trig import advance
 from dubins_traffic.policies.in_flight import Patience, settle
 
 if TYPE_CHECKING:
@@ -101,12 +101,10 @@ def foresee(tick: int, outlook: Outlook, state: State, labels: Labels, seen: For
     delay = seen.under_way.shape[1]
     own, told = seen.state, seen.labels
     for n in range(state.count[0]):
-        x, y, c, s = state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n]
+        pose = Pose(state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n])
         if position > 0.0 or heading > 0.0:
-            x += position * cut_bell(seed, trial, n, tick, DRAW.POSITION)
-            y += position * cut_bell(seed, trial, n, tick, DRAW.POSITION + 3)
-            turn_c, turn_s = sincos(heading * cut_bell(seed, trial, n, tick, DRAW.HEADING))
-            c, s = c * turn_c - s * turn_s, s * turn_c + c * turn_s
+            pose = blurred(pose, seed, trial, n, tick, position, heading)
+        x, y, c, s = pose
         speed, yaw_rate, bits = state.speed[0, n], state.yaw_rate[0, n], int(labels.bits[0, n])
         if n != EGO and delay > 0:
             for k in range(delay):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, NONE, Labels, State
+from dubins_traffic.cars.state import EGO, NONE, Labels, Pose, State
 from dubins_traffic.cars.tables import CarTable, ObstacleTable, box_at, box_of
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.boxes import NEVER, Box
@@ -169,12 +169,22 @@ def blur(seen: Seen, count: int, seed: Any, trial: int, tick: int, position: flo
     It is at most CUT of them. `neighbours` has filled the first `count` (count) rows of `seen`.
     """
     for k in range(count):
-        pose = seen.poses[k]
-        car = seen.labels[k].car
-        pose.x += position * cut_bell(seed, trial, car, tick, DRAW.POSITION)
-        pose.y += position * cut_bell(seed, trial, car, tick, DRAW.POSITION + 3)
-        c, s = sincos(heading * cut_bell(seed, trial, car, tick, DRAW.HEADING))
-        pose.c, pose.s = pose.c * c - pose.s * s, pose.s * c + pose.c * s
+        pose, car = seen.poses[k], seen.labels[k].car
+        pose.x, pose.y, pose.c, pose.s = blurred(
+            Pose(pose.x, pose.y, pose.c, pose.s), seed, trial, car, tick, position, heading
+        )
+
+
+@jit_inline
+def blurred(pose: Pose, seed: Any, trial: int, car: int, tick: int, position: float, heading: float) -> Pose:
+    """Return the pose of `car` (index) with the noise of `blur`: deviations `position` (m) and `heading` (rad)."""
+    c, s = sincos(heading * cut_bell(seed, trial, car, tick, DRAW.HEADING))
+    return Pose(
+        pose.x + position * cut_bell(seed, trial, car, tick, DRAW.POSITION),
+        pose.y + position * cut_bell(seed, trial, car, tick, DRAW.POSITION + 3),
+        pose.c * c - pose.s * s,
+        pose.s * c + pose.c * s,
+    )
 
 
 @jit

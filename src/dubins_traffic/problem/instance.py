@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from math import inf
+from math import inf, sqrt
 from typing import TYPE_CHECKING, Any, Self
 
 from dubins_traffic.cars.body import Car, Obstacle
 from dubins_traffic.cars.read_only import read_only
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.display import Pictured, count
+from dubins_traffic.kernels.random import CUT
 from dubins_traffic.problem.preconditions import check_curves
 
 if TYPE_CHECKING:
@@ -108,6 +109,16 @@ class Problem(Pictured):
     def period(self) -> float:
         """Seconds of a tick, T = 1 / rate."""
         return 1.0 / self.rate
+
+    @property
+    def off_centre(self) -> float:
+        """How far a centre may be from where it is seen, metres."""
+        return sqrt(2.0) * (CUT * self.pose_noise[0])
+
+    @property
+    def unsure(self) -> float:
+        """How far any point of a car may be from where it is seen, metres."""
+        return self.off_centre + self.car.body.reach * (CUT * self.pose_noise[1])
 
 
 def _disturbed(problem: Problem, by: Disturbances) -> Problem:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from math import sqrt
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,7 +12,6 @@ from dubins_traffic.cars.body import Body, Disc, Rectangle
 from dubins_traffic.cars.state import Contact, Frames, Labels, State
 from dubins_traffic.cars.touching import Touching
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.kernels.random import CUT
 from dubins_traffic.problem.instance import OUTSIDE, Instance, Problem
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.rules.labeller import Labeller
@@ -34,54 +32,38 @@ FOR, MEASURED, AGAINST = -1.0, 0.0, 1.0
 """By which share of the tolerance bodies are taken to be larger than they are."""
 
 
-@dataclass(frozen=True, slots=True)
-class Tolerance:
-    """How far, in metres, any point of a car may be from where it is seen, and its centre from where it was seen."""
-
-    point: float
-    moved: float
-
-    @classmethod
-    def of(cls, instance: Instance) -> Tolerance:
-        """Return the tolerance of an instance's poses: its noise is a bound."""
-        noise = instance.disturbances
-        position = sqrt(2.0) * CUT * noise.position_noise
-        return cls(position + CUT * noise.heading_noise * instance.problem.car.body.reach, 2.0 * position)
-
-
 class Tracked:
     """A sink that judges a trial of a world outside three times: as measured, for the cars, and against them."""
 
     def begin(self, instance: Instance) -> None:
         """Start without a frame."""
         tracked = instance.simulator in OUTSIDE and bool(instance.problem.rules)
-        tolerance = Tolerance.of(instance) if tracked else Tolerance(0.0, 0.0)
-        self._judged = [_Judged(instance, tolerance, by) for by in (MEASURED, FOR, AGAINST) if tracked]
-        self._point = tolerance.point
+        self._three = [_Judged(instance, by) for by in (MEASURED, FOR, AGAINST) if tracked]
+        self._tolerance = instance.problem.unsure
 
     def frames(self, frames: Frames) -> None:
         """Take a block of frames."""
-        for own in self._judged:
+        for own in self._three:
             own.frames(frames)
 
     def end(self, ending: Ending) -> None:
         """Keep the ending."""
-        for own in self._judged:
+        for own in self._three:
             own.end(ending)
 
     def findings(self) -> Findings | None:
         """Return what has been found up to the last frame as measured, None if poses are exact."""
-        return self._judged[0].findings() if self._judged else None
+        return self._three[0].findings() if self._three else None
 
     def told(self, exact: Verdict | None) -> Verdict | None:
         """Return the verdict of `findings` if all three judgements agree, else that it can't be told.
 
         Norm: docs/rules.md#told.
         """
-        if exact is None or not self._judged:
+        if exact is None or not self._three:
             return exact
-        verdict = replace(exact, tolerance=self._point)
-        found = [own.result() for own in self._judged[1:]]
+        verdict = replace(exact, tolerance=self._tolerance)
+        found = [own.result() for own in self._three[1:]]
         if all(own is not None and own.verdict is verdict.verdict for own in found):
             return verdict
         return replace(verdict, verdict=Ruling.UNTOLD, clean=False, cut=True, excuse=None)
@@ -90,8 +72,8 @@ class Tracked:
 class _Judged(Judging):
     """Judges frames whose labels and contacts follow anew from poses, with bodies and limits moved by a tolerance."""
 
-    def __init__(self, instance: Instance, tolerance: Tolerance, by: float) -> None:
-        instance = moved(instance, tolerance, by)
+    def __init__(self, instance: Instance, by: float) -> None:
+        instance = moved(instance, by)
         problem = instance.problem
         self.begin(instance)
         self._state = State.zeros(1, len(instance.names))
@@ -134,18 +116,18 @@ def _is_again(breach: Breach, entered: set[tuple[int, int, int]]) -> bool:
     return breach.rule.startswith("3.") and (breach.car, breach.vertex, breach.tick) in entered
 
 
-def moved(instance: Instance, tolerance: Tolerance, by: float) -> Instance:
-    """Return an instance with bodies, roads and limits moved by a share of a tolerance, against the cars if `by` > 0.
+def moved(instance: Instance, by: float) -> Instance:
+    """Return an instance with bodies, roads and limits moved by a share of its tolerance, against the cars if `by` > 0.
 
     A car that stands is `still` whatever the noise, in any case.
     """
     problem = instance.problem
     rules = RuleParameters.from_mapping(problem.rules)
-    point = by * tolerance.point
+    point = by * problem.unsure
     usual = {"approach_distance": rules.approach_distance, "queue_distance": rules.queue_distance}
     usual["turn_back"] = rules.turn_back
     near = {name: max(value - 2.0 * point, LEAST * value) for name, value in usual.items()}
-    still = rules.still_speed + tolerance.moved / rules.stop_time
+    still = rules.still_speed + 2.0 * problem.off_centre / rules.stop_time
     limits = {**rules.to_mapping(), **near, "still_speed": still}
     car = replace(problem.car, body=_grown(problem.car.body, point), w=problem.car.w - 0.5 * point)
     return replace(instance, problem=replace(problem, car=car, rules=limits))

@@ -124,12 +124,12 @@ def _elsewhere(
     known: list[Measured] = []
 
     def described(instance: Instance) -> Instance:
-        if not known:
+        problem, is_first = instance.problem, not known
+        if is_first:
             known.append(world.measure(instance))
-        declared = known[0].disturbances(instance.problem, delay, noise)
-        if len(known) == 1:
-            say(known[0].told(instance.problem, declared))
-            known.append(known[0])
+        declared = known[0].disturbances(problem, delay, noise)
+        if is_first:
+            say(known[0].told(problem, declared))
         return replace(instance, disturbances=declared)
 
     return world, described

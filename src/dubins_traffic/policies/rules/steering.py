@@ -88,13 +88,11 @@ def move(
         pose = Pose(state.x[b, n], state.y[b, n], *heading(Line(left - offset, px, py, allowed), steep))
         safe = is_safe_from(pose, b, Command(allowed, 0.0), near, trusted, traffic, vehicle)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
-    slants = outside and offset == 0.0 and left > SLIGHT
-    keeps_out = not slants and offset == 0.0 and abs(left) > SLIGHT
     if returns and near > 0 and vehicle.tightest == 0.0:
         motion = Motion(speed, yaw_rate, safe)
         speed, yaw_rate, safe = come_back(b, n, motion, Line(left, px, py, allowed), way, near, traffic)
-    if not safe and offset == 0.0 and (passes or returns or slants or keeps_out):
-        if returns or slants:
+    if not safe and offset == 0.0 and (passes or returns or abs(left) > SLIGHT):
+        if returns or (outside and left > SLIGHT):
             allowed = min(allowed, room_to_return(b, n, way, traffic) / vehicle.period)
         speed, yaw_rate = steer(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import compress
-from math import sqrt
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -13,7 +12,6 @@ import numpy.typing as npt
 from dubins_traffic.cars.state import Labels, State
 from dubins_traffic.cars.tables import ObstacleTable, pack_cars
 from dubins_traffic.kernels.arrays import Floats, Ints, distinct
-from dubins_traffic.kernels.random import CUT
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
 from dubins_traffic.policies.rules.abilities import DAWDLE, least_speed, near_of, sight_of, through_speed
@@ -323,8 +321,7 @@ def vehicles_of(problems: Sequence[Problem], disturbed: Sequence[bool] = ()) -> 
     least = np.array([least_speed(problems[k]) for k in first])
     rows["dawdle"] = np.maximum(DAWDLE, least)[alike]
     for own, problem in compress(zip(rows, problems, strict=True), disturbed):
-        position, heading = (CUT * noise for noise in problem.pose_noise)
-        own.late, own.unsure = problem.command_delay, sqrt(2.0) * position + own.reach * heading
+        own.late, own.unsure = problem.command_delay, problem.unsure
         own.over -= own.unsure
         own.near = near_of(problem.car, problem.period * (1.0 + own.late)) + 2.0 * own.unsure
     return rows
