@@ -40,7 +40,7 @@ class Drive:
         """Commands, and whether they are safe."""
         vehicle = SimpleNamespace(
             yaw_most=Real("yaw_most"), tightest=Real("tightest"), half_length=0.0 if disc else Real("half_length"),
-            period=Real("period"), slowest=Real("slowest"),
+            period=Real("period"), slowest=Real("slowest"), reach=Real("reach"), middle=Real("middle"),
         )  # fmt: skip
         self.disc = disc
         self.premises = [vehicle.tightest.term >= 0, *([] if disc else [vehicle.half_length.term > 0])]
@@ -71,7 +71,8 @@ class Drive:
         return PLAIN | {
             "is_safe": self.is_safe, "is_safe_from": _either_way, "steer": _pair, "keep_right": _pair,
             "heading": _pair, "slowed": _any_real, "room_to_return": _any_real, "along": _any_real,
-            "last_return": _any_real, "backs_off": _any_real, "within_lane": _either_way, "stays_right": _either_way,
+            "aside": _any_real, "travel_of": _any_real, "last_return": _any_real, "backs_off": _any_real,
+            "within_lane": _either_way, "stays_right": _either_way,
         }  # fmt: skip
 
 

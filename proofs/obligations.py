@@ -93,7 +93,7 @@ OBLIGATIONS: Final = {
         ),
         Obligation(
             "driven", "With others close, the law gives a command that it has found safe, or stands (E2).", KEEPING,
-            ("policies.rules.steering.move", "policies.rules.steering.come_back", "policies.rules.steering.goes_on"),
+            tuple(f"policies.rules.steering.{name}" for name in ("move", "come_back", "fall_back", "goes_on")),
             "discs and rectangles, every way, every offset and every speed", keeping.drives_clear_or_stands,
         ),
         Obligation(
@@ -141,6 +141,7 @@ FLAWS: Final = (
     Flaw("standing", referee_kernel, "far = roads.half_width[net] + GRAIN", "far = roads.half_width[net] - GRAIN"),
     Flaw("driven", steering, "    if not safe:\n        speed = 0", "    if not safe and near > 1:\n        speed = 0"),
     Flaw("driven", steering, "return on and (not outside", "return (not outside"),
+    Flaw("driven", steering, "return retreat", "return Motion(retreat.speed, 0.0, retreat.safe)"),
     Flaw("called", breaches, "FIRST_AND_CLEAR == FIRST_AND_CLEAR", "FIRST_AND_CLEAR != 0"),
 )  # fmt: skip
 

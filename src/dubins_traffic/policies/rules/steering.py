@@ -11,13 +11,14 @@ from dubins_traffic.cars.state import EGO, Command, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import within_lane
-from dubins_traffic.policies.rules.passing import along
+from dubins_traffic.policies.rules.passing import WARY, along, aside
 from dubins_traffic.policies.rules.returning import NARROWLY, last_return
 from dubins_traffic.policies.rules.seeing import ABRUPT, ASTRAY
 from dubins_traffic.policies.rules.standing import may_drive_on, stays_right
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
-from dubins_traffic.policies.safety import may_hit, may_meet, travel_of
+from dubins_traffic.policies.safety import GUARD, may_hit, may_meet, travel_of
+from dubins_traffic.roads.lookup import INFINITE
 from dubins_traffic.rules.propositions import FLAG
 
 HURRY, WIDE = 0.25, 0.4
@@ -161,7 +162,40 @@ def come_back(
                 vehicle.yaw_most, 0.0, vehicle.period,
             )  # fmt: skip
             return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
+    if not (safe and line.speed >= CREEPS) and traffic.drivers.car[b, n].aside != 0.0:
+        retreat = fall_back(b, n, own, line, way, near, traffic)
+        if retreat.safe:
+            return retreat
     return Motion(motion.speed, motion.yaw_rate, safe)
+
+
+@jit_rare
+def fall_back(
+    b: int, n: int, own: float, line: Line, way: ReferencePath, near: int, traffic: Traffic
+) -> Motion:
+    """Return the motion of a passing car back behind one that has moved up, ahead of which it can't return any more.
+
+    It is at `own` (m) along the lane, and ends its manoeuvre; without such a car (`near` are listed) nothing is safe.
+    """
+    state, scratch, vehicle = traffic.state, traffic.scratch, traffic.drivers.vehicle[b]
+    room = 2.0 * vehicle.reach + travel_of(vehicle) + GUARD + WARY
+    last = max(own, last_return(vehicle))
+    clear = 0.0
+    for k in range(near):
+        j = scratch.near[k]
+        key, its = along(way, state.x[b, j], state.y[b, j]), aside(way, state.x[b, j], state.y[b, j])
+        if its < vehicle.middle and key - room < own and last < key + room:
+            clear = max(clear, its + room)
+    if clear == 0.0:
+        return Motion(0.0, 0.0, False)
+    gear = -1.0 if vehicle.slowest < 0.0 else 1.0
+    speed, yaw_rate = steer(
+        gear * state.c[b, n], gear * state.s[b, n], clear - line.left, -line.px, -line.py, 0.0, SLIDES, SLANT, ALIGNED,
+        vehicle.yaw_most, 0.0, vehicle.period,
+    )  # fmt: skip
+    speed = max(gear * speed, vehicle.slowest)
+    traffic.drivers.car[b, n].until = -INFINITE
+    return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
 
 
 @jit_inline
@@ -194,14 +228,8 @@ def keep_right(
     state, labels, drivers = traffic.state, traffic.labels, traffic.drivers
     vehicle = drivers.vehicle[b]
     bits = np.int64(labels.bits[b, n])
-    lawless = drivers.car[b, n].violations & VIOLATION.LEFT_SIDE != 0
-    if (
-        lawless
-        or speed == 0.0
-        or not outside
-        or bits & FLAG.LEFT != 0
-        or stays_right(b, n, speed, yaw_rate, way, traffic)
-    ):
+    left = drivers.car[b, n].violations & VIOLATION.LEFT_SIDE != 0 or bits & FLAG.LEFT != 0
+    if left or speed == 0.0 or not outside or stays_right(b, n, speed, yaw_rate, way, traffic):
         return speed, yaw_rate
     leans = way.tx * state.s[b, n] - way.ty * state.c[b, n] > 0.0
     if drivers.car[b, n].aside != 0.0 and bits & FLAG.OVERTAKING != 0 and may_drive_on(b, n, way, traffic):
