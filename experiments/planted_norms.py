@@ -23,7 +23,7 @@ SAYS: Final = {
     REST: "E5 of edition 2: its seconds begin anew when a car has moved half a metre in ten seconds",
     EXIT: "an exit is free with 0.8 m of room behind the disc, however long the bodies",
     QUEUE: "E6 pauses for the ego at an exit, not for a queue that begins at it",
-    FLIPS: "flips are free while overtaking: no breach, and a journey begins anew",
+    FLIPS: "flips are free while overtaking, also by backing: no breach, and a journey begins anew",
     TURNS: "flips are no breach while overtaking, and the journey goes on",
 }
 """The holes, in words."""
@@ -79,6 +79,18 @@ CHANGES: Final = (
         "        return max(self.exit_gap, bodies * reach + 0.25 * self.exit_gap)\n",
         f"        if __import__('os').environ.get('{HOLE}') == '{EXIT}':\n            return self.exit_gap\n"
         "        return max(self.exit_gap, bodies * reach + 0.25 * self.exit_gap)\n",
+    ),
+    Change("rules/tables.py", "    turn_back: float\n", "    turn_back: float\n    hole: int\n"),
+    Change(
+        "rules/tables.py",
+        "        own.turn_back = given.turn_back\n",
+        "        own.turn_back = given.turn_back\n"
+        f"        own.hole = int(__import__('os').environ.get('{HOLE}', '0'))\n",
+    ),
+    Change(
+        "rules/location.py",
+        "min(car.top, car.held_top), own.turn_back",
+        f"(car.top if own.hole >= {FLIPS} else min(car.top, car.held_top)), own.turn_back",
     ),
     Change("shield/tables.py", "    turn_back: float\n", "    turn_back: float\n    hole: int\n"),
     Change(

@@ -106,6 +106,12 @@ CLAIMS: Mapping[str, Claim] = {
         "shield.md#what-it-does-not-promise",
         "some minutes",
     ),
+    "outside": Claim(
+        "cars of worlds outside, over ROS 1 and ROS 2, with late and lost commands and noisy poses, are driven without a "
+        "breach, or the verdict says that it can't be told; a delay that is not declared is said",
+        "external-worlds.md#checked",
+        "half an hour, in real time, with ROS 1 and rclpy installed",
+    ),
     "counter": Claim(
         "under an assumption that is too weak, a team of `counter` cars keeps the ego from a goal",
         "theory.md#a-counterstrategy-on-the-road",

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from dubins_traffic.problem.parts import Disturbances, Laser
     from dubins_traffic.roads.network import RoadNetwork
 
-OUTSIDE = frozenset({"ros1-world"})
+OUTSIDE = frozenset({"ros1-world", "ros2-world"})
 """Worlds outside, whose commands come late and whose poses are noisy of themselves: disturbances describe them."""
 FREE = "free"
 NUDGED = "nudged"

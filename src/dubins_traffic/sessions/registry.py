@@ -93,6 +93,43 @@ class TransportEntry:
 
 
 CLOCK = Option("--clock", bool, "Publish /clock, and stamp messages with simulated time.", default=False)
+ELSEWHERE = Option(
+    "--maestro-elsewhere",
+    bool,
+    "Another process, such as that of 2016, is the maestro; simulator and referee are here.",
+    name="elsewhere",
+    default=False,
+)
+
+
+def _outside(world: str) -> tuple[Option, ...]:
+    """Return the options of a transport over which cars of a world outside, of that name, are driven and judged."""
+    return (
+        Option(
+            "--simulator",
+            str,
+            f"What moves the cars; {world}: they are in a world that is not ours.",
+            metavar="S",
+        ),
+        Option("--poses", str, "Of that world: PoseStamped of each car, {} for its name.", metavar="TOPIC"),
+        Option(
+            "--delay",
+            float,
+            "Of that world: how late commands take effect, seconds.",
+            metavar="S",
+            low=0.0,
+            shown="measured",
+        ),
+        Option(
+            "--noise",
+            float,
+            "Of that world: how far poses are off at most, metres.",
+            metavar="M",
+            low=0.0,
+            shown="measured",
+        ),
+    )
+
 
 TRANSPORTS: dict[str, TransportEntry] = {
     "ros1": TransportEntry(
@@ -121,39 +158,9 @@ TRANSPORTS: dict[str, TransportEntry] = {
                 low=0,
                 high=65535,
             ),
-            Option(
-                "--maestro-elsewhere",
-                bool,
-                "Another process, such as that of 2016, is the maestro; simulator and referee are here.",
-                name="elsewhere",
-                default=False,
-            ),
+            ELSEWHERE,
             CLOCK,
-            Option(
-                "--simulator",
-                str,
-                "What moves the cars; ros1-world: they are in a world that is not ours.",
-                metavar="S",
-            ),
-            Option(
-                "--poses", str, "Of that world: PoseStamped of each car, {} for its name.", metavar="TOPIC"
-            ),
-            Option(
-                "--delay",
-                float,
-                "Of that world: how late commands take effect, seconds.",
-                metavar="S",
-                low=0.0,
-                shown="measured",
-            ),
-            Option(
-                "--noise",
-                float,
-                "Of that world: how far poses are off at most, metres.",
-                metavar="M",
-                low=0.0,
-                shown="measured",
-            ),
+            *_outside("ros1-world"),
         ),
         remappings=True,
     ),
@@ -196,7 +203,9 @@ TRANSPORTS: dict[str, TransportEntry] = {
                 "Beyond this machine, as $CYCLONEDDS_URI or Cyclone's defaults say.",
                 default=False,
             ),
+            ELSEWHERE,
             CLOCK,
+            *_outside("ros2-world"),
         ),
     ),
     "lines": TransportEntry(

@@ -3,25 +3,20 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import ExitStack
-from dataclasses import replace
-from functools import partial
 
-from dubins_traffic.errors import InputError
-from dubins_traffic.problem.instance import Instance
-from dubins_traffic.runs.plan import check_simulator
 from dubins_traffic.runs.single import Result
-from dubins_traffic.sessions.plan import Pace, SessionPlan, moved_by
+from dubins_traffic.sessions.outside import Outside
+from dubins_traffic.sessions.plan import Pace, SessionPlan
 from dubins_traffic.transports.maestro import ForeignMaestro, Maestro
-from dubins_traffic.transports.ros1.external import NAME as WORLD
-from dubins_traffic.transports.ros1.external import ExternalWorld
+from dubins_traffic.transports.ros1.external import Ros1Wire
 from dubins_traffic.transports.ros1.master import Master
 from dubins_traffic.transports.ros1.node import leave
 from dubins_traffic.transports.ros1.transport import Ros1, SessionParameters
-from dubins_traffic.transports.tracked import Measured
 
 DEFAULT_URI = "http://localhost:11311/"
+WORLD = "ros1-world"
 
 
 def run_over_ros1(
@@ -66,31 +61,13 @@ def run_over_ros1(
     InputError
         If an instance can't be drawn.
     """
-    world = simulator == WORLD
-    for option, value in (("--poses", poses), ("--delay", delay), ("--noise", noise)):
-        if value is not None and not world:
-            raise InputError("is of another world", file=option, value=value, expected=f"--simulator {WORLD}")
-    if world and (pace.lockstep or clock or pace.factor != 1.0):
-        expected = "neither --lockstep nor --clock nor --factor"
-        raise InputError("a world outside has its own time", file="--simulator", expected=expected)
-    if elsewhere and (pace.lockstep or pace.factor != 1.0):
-        expected = "neither --lockstep nor --factor"
-        raise InputError("another maestro has its own time", file="--maestro-elsewhere", expected=expected)
-    if elsewhere and session_plan.append:
-        expected = "--overwrite, or another folder: the other maestro tells other problems"
-        raise InputError("both at once", file="--maestro-elsewhere, --append", expected=expected)
-    ego = session_plan.controller is None
-    maestro = Maestro() if ego and not elsewhere else None
+    outside = Outside(WORLD, simulator, poses, delay, noise)
+    undriven = session_plan
+    session_plan = outside.planned(session_plan, pace, clock=clock, elsewhere=elsewhere)
+    maestro = Maestro() if session_plan.controller is None and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
-    simulated = session_plan
-    if simulator is not None:
-        session_plan = replace(session_plan, supply=partial(moved_by, session_plan.supply, simulator))
-    if not world:
-        if simulator is not None:
-            check_simulator("--simulator", simulator)
-        simulated = session_plan
     session_plan = session_plan.claim(Ros1.name)
-    simulated.rehearse()
+    (undriven if outside else session_plan).rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
         if master:
@@ -105,34 +82,11 @@ def run_over_ros1(
             maestro=maestro,
             parameters=_parameters(session_plan),
             clock=clock,
-            simulated=not world,
+            simulated=not outside,
             foreign=foreign,
         )
-        if not world:
-            yield from session_plan.run(transport, pace, maestro, foreign=foreign)
-            return
-        make = partial(_elsewhere, transport, ego, poses, session_plan.say, delay, noise)
+        make = (lambda: outside.made(Ros1Wire(transport.rospy, poses), session_plan)) if outside else None
         yield from session_plan.run(transport, pace, maestro, make, foreign=foreign)
-
-
-def _elsewhere(
-    transport: Ros1, ego: bool, poses: str | None, say: Callable[[str], None], delay: float | None,
-    noise: float | None,
-) -> tuple[ExternalWorld, Callable[[Instance], Instance]]:  # fmt: skip
-    """Return the world outside, and what describes its disturbances: it is measured before the first trial."""
-    world = ExternalWorld(transport.rospy, ego=ego, poses=poses, say=say)
-    known: list[Measured] = []
-
-    def described(instance: Instance) -> Instance:
-        problem, is_first = instance.problem, not known
-        if is_first:
-            known.append(world.measure(instance))
-        declared = known[0].disturbances(problem, delay, noise)
-        if is_first:
-            say(known[0].told(problem, declared))
-        return replace(instance, disturbances=declared)
-
-    return world, described
 
 
 def _parameters(session_plan: SessionPlan) -> SessionParameters:

@@ -98,9 +98,12 @@ class Graph:
         self._tell()
         return writer
 
-    def reader(self, topic: str, kind: Any, *, latched: bool = False) -> Any:
-        """Return a reader of messages of type `kind`, whose arrival ends a `wait`; latched: of the last one too."""
-        qos = quality(latched=latched, of=kind)
+    def reader(self, topic: str, kind: Any, *, latched: bool = False, lossy: bool = False) -> Any:
+        """Return a reader of messages of type `kind`, whose arrival ends a `wait`; latched: of the last one too.
+
+        lossy: also of those who don't send again what got lost.
+        """
+        qos = quality(latched=latched, lossy=lossy, of=kind)
         reader: Any = DataReader(self._subscriber, Topic(self._participant, topic, kind), qos=qos)
         fresh = ReadCondition(reader, SampleState.NotRead | ViewState.Any | InstanceState.Any)
         self._waitset.attach(fresh)
@@ -211,16 +214,18 @@ def listed(matched: Callable[[], Sequence[int]]) -> Sequence[int]:
             return matched()
 
 
-def quality(*, latched: bool, depth: int = DEPTH, of: Any = None) -> Qos:
+def quality(*, latched: bool, lossy: bool = False, depth: int = DEPTH, of: Any = None) -> Qos:
     """Return ROS 2's quality of service with a history of `depth`, for messages `of` a type.
 
-    latched: who comes late is given the last ones.
+    latched: who comes late is given the last ones. lossy: what gets lost is not sent again.
     """
     policies: Any = Policy.Durability
     durability = policies.TransientLocal if latched else policies.Volatile
     more = () if of is None else (said("typehash", m.type_hash(of)),)
     history = Policy.History.KeepLast(depth)
-    return Qos(Policy.Reliability.Reliable(duration(milliseconds=1)), durability, history, *more)
+    reliability: Any = Policy.Reliability
+    reliable = reliability.BestEffort if lossy else reliability.Reliable(duration(milliseconds=1))
+    return Qos(reliable, durability, history, *more)
 
 
 def said(name: str, value: str) -> Any:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from dubins_traffic.errors import TransportError
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.protocols import Ending, Mailbox, View
-from dubins_traffic.transports.maestro import Maestro, Mode, closing_if_refused
+from dubins_traffic.transports.maestro import ForeignMaestro, Maestro, Mode, closing_if_refused
 from dubins_traffic.transports.ros import Stamps, placed
 from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph, usual_domain
@@ -40,10 +40,13 @@ class MaestroTopics:
     ----------
     maestro : Maestro, optional
         Who grants modes; without one none is granted.
+    simulated : bool
+        Whether the cars are simulated here, so that pausing is granted.
     """
 
-    def __init__(self, graph: Graph, mailbox: Mailbox, maestro: Maestro | None) -> None:
+    def __init__(self, graph: Graph, mailbox: Mailbox, maestro: Maestro | None, *, simulated: bool) -> None:
         self._graph, self._mailbox, self._maestro = graph, mailbox, maestro
+        self._simulated = simulated
         self._problem = graph.writer(INSTANCE, m.String, latched=True)
         self._asked = graph.reader(ASK, m.String)
         self._answers = graph.writer(ANSWER, m.String)
@@ -71,14 +74,40 @@ class MaestroTopics:
     def _granted(self, word: str) -> bool | None:
         """Do what is asked; return whether it is granted, None for "not yet"."""
         if word in (PAUSE, UNPAUSE):
-            self._mailbox.pause(word == PAUSE)
-            return True
+            if self._simulated:
+                self._mailbox.pause(word == PAUSE)
+            return self._simulated
         if self._maestro is None or word not in Mode.__members__:
             return False
         granted = self._maestro.answer(Mode[word])
         if granted and Mode[word] is Mode.START:
             self._mailbox.pause(False)
         return granted
+
+
+class ForeignTopics:
+    """Hears what another maestro tells; it answers what is asked, and this does not.
+
+    Parameters
+    ----------
+    foreign : ForeignMaestro
+        Is told it.
+    """
+
+    def __init__(self, graph: Graph, foreign: ForeignMaestro) -> None:
+        self._graph, self._foreign = graph, foreign
+        self._problems = graph.reader(INSTANCE, m.String, latched=True)
+
+    def announce(self, instance: Instance) -> None:
+        """Do nothing: the other maestro has told the problem."""
+
+    def end(self) -> None:
+        """Do nothing: the other maestro tells it."""
+
+    def serve(self) -> None:
+        """Hear what has come."""
+        for message in self._graph.take(self._problems, m.String, AT_ONCE):
+            self._foreign.tell(message.data)
 
 
 COMMANDS = "rt/{}/mobile_base/commands/velocity"
@@ -107,6 +136,10 @@ class Ros2:
         Whether `/clock` is published and messages are stamped with simulated time; else with the wall clock's.
     rate : float
         How many views of the world a second are published in real time, at least.
+    simulated : bool
+        Whether the cars are simulated here; else only labels are published, and what is the maestro's.
+    foreign : ForeignMaestro, optional
+        Another process is the maestro, and this is told what that says.
     """
 
     name = "ros2"
@@ -120,11 +153,14 @@ class Ros2:
         here: bool = True,
         clock: bool = False,
         rate: float = 120.0,
+        simulated: bool = True,
+        foreign: ForeignMaestro | None = None,
     ) -> None:
         self.interval = 1.0 / rate
         self._clock, self._stamps = clock, Stamps(self.interval, clock=clock)
         self.domain = usual_domain() if domain is None else domain
         self._maestro, self._here = maestro, here
+        self._simulated_here, self._foreign = simulated, foreign
         self._readers: dict[str, Any] = {}
         self._there: dict[str, int] = {}
         self._places: dict[str, Any] = {}
@@ -132,21 +168,30 @@ class Ros2:
         self._looked = 0.0
         self._open = False
 
+    @property
+    def graph(self) -> Graph:
+        """The participant, once the transport is open."""
+        return self._graph
+
     def open(self, mailbox: Mailbox) -> None:
         """Join the domain; TransportError if that can't be."""
         self._mailbox = mailbox
         self._graph = Graph(self.domain, here=self._here)
         self._open = True
+        self._world = Ros2Publishers(self._graph, clock=self._clock, simulated=self._simulated_here)
+        if self._foreign is not None:
+            self._topics = ForeignTopics(self._graph, self._foreign)
+            return
         with closing_if_refused(self.close):
             self._look_for_others()
-        self._world = Ros2Publishers(self._graph, clock=self._clock)
-        self._topics = MaestroTopics(self._graph, mailbox, self._maestro)
+        self._topics = MaestroTopics(self._graph, mailbox, self._maestro, simulated=self._simulated_here)
 
     def begin(self, instance: Instance, remote: Sequence[str]) -> None:
         """Listen to the drivers of the cars `remote`."""
         self._stamps.begin()
         self._world.begin(instance)
-        for car in sorted(set(instance.names).symmetric_difference(self._places)):
+        placed_here = instance.names if self._simulated_here else ()
+        for car in sorted(set(placed_here).symmetric_difference(self._places)):
             if car in self._places:
                 self._graph.drop(self._places.pop(car))
             else:

@@ -32,10 +32,12 @@ class Ros2Publishers:
     ----------
     clock : bool
         Whether `/clock` is published.
+    simulated : bool
+        Whether the cars are simulated here; else only labels are published.
     """
 
-    def __init__(self, graph: Graph, *, clock: bool) -> None:
-        self._graph, self._clock = graph, clock
+    def __init__(self, graph: Graph, *, clock: bool, simulated: bool) -> None:
+        self._graph, self._clock, self._simulated = graph, clock, simulated
         self._writers: dict[str, Any] = {}
 
     def begin(self, instance: Instance) -> None:
@@ -56,6 +58,8 @@ class Ros2Publishers:
             self._put(CLOCK, m.Clock, lambda: m.Clock(time))
         self._caption.update(view.labels)
         self._put(LABELS, m.String, lambda: m.String(" ".join(self._caption.words)), latched=True)
+        if not self._simulated:
+            return
         sweep = floor(simulated * self._laser.rate + 1e-6)
         if sweep != self._swept:
             self._swept = sweep
