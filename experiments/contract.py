@@ -52,6 +52,15 @@ SOON: Final = {"rest_time": 40.0, "journey_start_time": 8.0, "goal_time": 20.0, 
 
 A shorter time for a journey would leave a free car none in which it does as it likes (`agents.free.RESERVE`)."""
 WAITING: Final = world((2, 2), 3.5, FREE, rules=SOON, duration=440)
+OBSTACLE: Final[dict[str, Any]] = {
+    "version": 1, "problem_domain": "dubins_traffic", "rate": 10, "rules": SOON | {"gap_rounds": 10.0},
+    "goals": [[0, 0], [2, 1]], "duration": 440, "e-agents": FREE,
+    "rnd": {
+        "version": 0, "length": 4.5, "transform": [0, 0, 0], "shape": [2, 3],
+        "segments": [[0, 0, 1, 0], [1, 0, 1, 1], [1, 1, 2, 1]],
+    },
+    "obstacles": [{"disc": {"x": 4.8, "y": 2.25, "radius": 0.1}}],
+}  # fmt: skip
 PROVOKING: Final = world((2, 3), 4.0, [{"type": "lawful", "name": "lawful", "count": 4}], duration=120)
 AMONG_FREE: Final = world(
     (2, 3), 4.0, [*FREE, {"type": "lawful", "name": "lawful"}], rules={"gap_rounds": 4.0}, duration=120
@@ -83,11 +92,16 @@ SEARCHES: Final = {
         "experiments.free_egos:Free", PROVOKING, PROVOKED,
         "any program under the shield among four lawful cars, trials of 120 s", most=1024,
     ),
+    "obstacle": Wanted(
+        "rules", OBSTACLE, BLOCKED, "`rules` between two free cars on an elbow, an obstacle in the only way, 440 s",
+        bar=False,
+    ),
     "among-free": Wanted(
         "rules", AMONG_FREE, PROVOKED, "`rules` among two free cars and a lawful one, trials of 120 s", bar=False
     ),
 }  # fmt: skip
-"""The searches by name. Two measure what is not claimed: `lanes`, and lawful cars among free ones."""
+"""The searches by name. Three measure what is not claimed: `lanes`, who meets obstacles, and lawful cars among free
+ones."""
 HAPPENS: Final = {
     BLOCKED: "without a visit for longer than may be, though nobody has broken a rule",
     PROVOKED: "a lawful car is the first to break a rule",

@@ -107,8 +107,8 @@ CLAIMS: Mapping[str, Claim] = {
         "some minutes",
     ),
     "outside": Claim(
-        "cars of worlds outside, over ROS 1 and ROS 2, with late and lost commands and noisy poses, are driven without a "
-        "breach, or the verdict says that it can't be told; a delay that is not declared is said",
+        "cars of worlds outside, over ROS 1 and ROS 2, with late and lost commands and noisy poses, are driven "
+        "without a breach, or the verdict says that it can't be told; a delay that is not declared is said",
         "external-worlds.md#checked",
         "half an hour, in real time, with ROS 1 and rclpy installed",
     ),

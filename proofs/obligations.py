@@ -22,6 +22,8 @@ ANY: Final = (
     "every body, segment (straight or bent), disc and rate; roads 0.2 m wide and `turn_back` 2 cm at least"
 )
 KEEPING: Final = "theory.md#kept-in-a-tick"
+STEPS: Final = ("move", "go_aside", "come_back", "fall_back", "goes_on")
+"""The law's last step and what it calls, in `policies.rules.steering`."""
 ANY_RATE: Final = "every rate and every bound of speed and yaw rate"
 
 OBLIGATIONS: Final = {
@@ -93,7 +95,7 @@ OBLIGATIONS: Final = {
         ),
         Obligation(
             "driven", "With others close, the law gives a command that it has found safe, or stands (E2).", KEEPING,
-            tuple(f"policies.rules.steering.{name}" for name in ("move", "come_back", "fall_back", "goes_on")),
+            tuple(f"policies.rules.steering.{name}" for name in STEPS),
             "discs and rectangles, every way, every offset and every speed", keeping.drives_clear_or_stands,
         ),
         Obligation(

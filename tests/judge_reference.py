@@ -274,10 +274,15 @@ class Judge:
         for other in self.cars:
             its = self.past[k][other]
             follows = other == 0 and not its["stands"]
-            near = here - reach <= its["progress"] < here and its["lane"] == facts["lane"]
-            self.fired["the ego stands behind"] += other == 0 and near and its["stands"]
+            along = self.reference.coordinates(lane, *its["spot"])[0]
+            in_disc_behind = its["at"] == self.reference.toward((lane[0], 1 - lane[1]))
+            same = in_disc_behind or (its["lane"] == facts["lane"] and not its["left"])
+            self.fired["the ego stands behind"] += (
+                other == 0 and same and here - reach <= along < here and its["stands"]
+            )
+            self.fired["one in the disc behind an obstacle"] += in_disc_behind and its["segment"] == lane[0]
             rear = here - reach if follows else here
-            behind = its["lane"] == facts["lane"] and its["progress"] < rear and not its["left"]
+            behind = same and along < rear
             there = its["segment"] == lane[0] and not behind
             if other != n and (there or its["crosses"] == facts["toward"]):
                 self.fired["not alone at an obstacle"] += 1

@@ -33,6 +33,9 @@ def test_rules_gets_past_who_stands_askew_beside_it() -> None:
     Or it had stopped, still left of its lane, where it could only go straight to the right before a disc, or a little
     back; or it did not lean past who stood in a bend, or leaned there to the inner corner of the road, where nothing is
     open to it, or turned to its line and back for ever; or who stood there owed no exit, since it came in later.
+
+    Or who stood before an obstacle just out of a bend was excused by the ego that waited in the bend behind it; or it
+    did not fall back behind who had moved up beside it, to a bend or into a dead end.
     """
     assert [
         own.file.name for own in outcomes(cases_in(CONTRACT / "blocked"), "rules") if not own.passed

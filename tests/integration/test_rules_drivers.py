@@ -3,6 +3,9 @@
 import pytest
 from experiments.rules import Drive, drive
 
+from dubins_traffic.problem.document import instance_from_document
+from dubins_traffic.runs.single import run_trial
+
 SAMPLE = 12
 
 
@@ -50,3 +53,29 @@ def test_rules_is_clean_with_bodies_and_bounds_of_other_kinds() -> None:
     cars = ({"body": rectangle}, {"bounds": {"turning_radius": 0.26}})
     found = [drive(number, "lawful", 60.0, car) for number in range(SAMPLE // 2) for car in cars]
     assert [one.number for one in found if one.own or one.others or one.collisions] == []
+
+
+@pytest.mark.parametrize("rate", [10, 30])
+def test_rules_drives_off_beside_an_obstacle_that_it_touches_at_the_start(rate: int) -> None:
+    """Starts are drawn clear of obstacles, but not by any distance."""
+    instance = instance_from_document(
+        {
+            "version": 1,
+            "goals": [[0, 0], [2, 1]],
+            "rnd": {
+                "version": 0, "length": 4.5, "transform": [0, 0, 0], "shape": [2, 3],
+                "segments": [[0, 0, 1, 0], [1, 0, 1, 1], [1, 1, 2, 1]],
+            },
+            "intersection_radius": 1.0,
+            "starts": {"ego": [4.2, 2.527000001, 0.0, -1.0]},
+            "duration": 120.0,
+            "e-agents": [],
+            "rate": rate,
+            "rules": True,
+            "obstacles": [{"disc": {"x": 4.2, "y": 2.25, "radius": 0.1}}],
+        },
+        "touching.json",
+    )  # fmt: skip
+    verdict = run_trial(instance, "rules").score.verdict
+    assert verdict is not None
+    assert (verdict.verdict, verdict.rounds) == ("satisfied", 3)

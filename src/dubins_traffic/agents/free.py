@@ -54,8 +54,8 @@ CROWD: Final = 0.3
 NEAR: Final = 1.5
 """How near that is beyond the disc, metres."""
 APART: Final = 0.5
-"""A free car does not move toward a body that is nearer than this, metres, of its own accord: the law would then wait
-for that one to go."""
+"""A free car does not move toward a body or an obstacle that is nearer than this, metres, of its own accord: the law
+would then wait for that one to go, or have no room to pass."""
 ASKEW, ALONG = 0.05, 0.99
 """How far from the middle of its lane, metres, and how far from its direction, a cosine, a body that is no disc still
 moves as it likes: it needs room to turn, which who stands behind it at a line would not leave."""
@@ -185,7 +185,7 @@ def _like(
     elif not owes and own.share >= 0.0:
         commands[b, n, 0] *= own.share
         commands[b, n, 1] *= own.share
-    elif not owes and _may(b, n, own, judging):
+    elif not owes and _may(b, n, own, judging, free):
         commands[b, n, 0], commands[b, n, 1] = own.speed, own.yaw_rate
 
 
@@ -235,7 +235,7 @@ def _think(b: int, n: int, tick: int, own: FreeCar, drivers: Drivers) -> None:
 
 
 @jit
-def _may(b: int, n: int, own: FreeCar, judging: RefereeTables) -> bool:
+def _may(b: int, n: int, own: FreeCar, judging: RefereeTables, free: Free) -> bool:
     """Tell whether a car may do what it likes: it stays apart from others, and along its lane unless it turns.
 
     In a disc it only stands, since from elsewhere than its way the law might not leave the disc in time (E4).
@@ -258,6 +258,12 @@ def _may(b: int, n: int, own: FreeCar, judging: RefereeTables) -> bool:
     for k in range(state.count[b]):
         dx, dy = state.x[b, k] - x, state.y[b, k] - y
         if (dx * c + dy * s) * own.speed > 0.0 and dx * dx + dy * dy < own.apart * own.apart:
+            return False
+    f, obstacles = int(free.row[b, n]), free.traffic.obstacles
+    for p in range(obstacles.off[f], obstacles.off[f + 1]):
+        part = obstacles.parts[p]
+        dx, dy, far = part.x - x, part.y - y, part.reach + own.apart
+        if (dx * c + dy * s) * own.speed > 0.0 and dx * dx + dy * dy < far * far:
             return False
     return True
 

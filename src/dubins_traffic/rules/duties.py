@@ -9,7 +9,7 @@ import numpy as np
 from dubins_traffic.cars.near import list_near
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
-from dubins_traffic.roads.lookup import lane_end
+from dubins_traffic.roads.lookup import lane_end, lane_start
 from dubins_traffic.rules.blocking import RightLane, lane_of, narrows, obstacle_narrows, place_in_lane
 from dubins_traffic.rules.breach_log import NEVER_DUE, RULE, RefereeTables
 from dubins_traffic.rules.breaches import FIRST_AND_CLEAR, add, at_goal, judge_queue, lasted, run, when_due
@@ -190,8 +190,8 @@ def _lacks_room(b: int, n: int, place: RightLane, here: float, v: int, tables: R
     """Tell whether an obstacle narrows the lane ahead of car n, and it may lack the room to pass that now.
 
     It lacks it if obstacles narrow the left lane, too, or the right one up to the disc of v at its end; or if another
-    car is in that disc or on the road, unless it is behind in the same lane and not the ego near by that does not
-    stand, and may come beside it.
+    car is in that disc or on the road, unless it is behind, in the same lane or in the disc where that begins, and not
+    the ego near by that does not stand, and may come beside it.
 
     Norm: docs/rules.md#lacks-room.
     """
@@ -207,13 +207,14 @@ def _lacks_room(b: int, n: int, place: RightLane, here: float, v: int, tables: R
     left, there = lane_of(tables.roads, own, b, place.lane ^ 1), place.length - here
     if obstacle_narrows(obstacles, left, there - 2.0 * way, there, needed):
         return True
+    begin = lane_start(tables.roads, own.net, place.lane)
     for k in range(tables.state.count[b]):
         if k == n:
             continue
         bits = np.int64(labels.bits[b, k])
         rear = here - way - GRAIN if k == EGO and bits & FLAG.STANDS == 0 else here
-        behind = labels.lane[b, k] == place.lane and tables.memory.car[b, k].progress < rear
-        behind = behind and bits & FLAG.LEFT == 0
+        behind = labels.at[b, k] == begin or (labels.lane[b, k] == place.lane and bits & FLAG.LEFT == 0)
+        behind = behind and place_in_lane(b, k, place.lane, tables.state, tables.roads, own)[0] < rear
         if labels.crosses[b, k] == v or (labels.segment[b, k] == place.lane // 2 and not behind):
             return True
     return False

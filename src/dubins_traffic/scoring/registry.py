@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from functools import cache
-from importlib import import_module
 from typing import Any, TypeVar, cast, get_args
 
 from dubins_traffic import outside
@@ -20,8 +19,6 @@ from dubins_traffic.scoring.metric import KINDS, Column, Kind, Maker, MetricSpec
 
 STRATEGY_SHARE = "strategy_share"
 """The metric that every trial has whose ego plays a strategy of another tool."""
-BUILT_IN = {STRATEGY_SHARE: ("dubins_traffic.scoring.strategy_share", "StrategyShare")}
-"""The metrics that core knows by name: module and class."""
 GROUP = "dubins_traffic.metrics"
 """Group of the entry points by which other packages offer metrics."""
 OPTION = "--metric"
@@ -131,8 +128,7 @@ def _maker(spec: MetricSpec) -> Maker:
 
 @cache
 def _registered() -> Mapping[str, Maker]:
-    ours = {name: getattr(import_module(place), own) for name, (place, own) in BUILT_IN.items()}
-    return {**outside.of_packages(GROUP), **ours}
+    return outside.of_packages(GROUP)
 
 
 def _line(maker: Maker) -> str:

@@ -238,7 +238,8 @@ def ego_is_beside(
 ) -> bool:
     """Tell whether the ego is in the lane where car n would pass: it might stay beside n, or stop where n returns.
 
-    One that stands behind n in its lane does not count: until it has set off, n is ahead of it on the left.
+    One that stands behind n in its lane, or in the disc where that begins, does not count: until it has set off, n is
+    ahead of it on the left.
     """
     state, labels = traffic.state, traffic.labels
     if labels.segment[b, EGO] != lane >> 1:
@@ -246,7 +247,8 @@ def ego_is_beside(
     key = along(way, state.x[b, EGO], state.y[b, EGO])
     left = aside(way, state.x[b, EGO], state.y[b, EGO])
     bits = np.int64(labels.bits[b, EGO])
-    if key < own and labels.lane[b, EGO] == lane and bits & (FLAG.STANDS | FLAG.LEFT) == FLAG.STANDS:
+    behind = labels.lane[b, EGO] == lane or labels.lane[b, EGO] < 0
+    if key < own and behind and bits & (FLAG.STANDS | FLAG.LEFT) == FLAG.STANDS:
         return False
     return (
         left < vehicle.middle and own - FOLLOWED < key < back + vehicle.backs_up + 2.0 * vehicle.reach + BERTH

@@ -7,6 +7,7 @@ from dubins_traffic.policies.rules.narrow import EDGE, within_lane
 from dubins_traffic.policies.rules.passing import BACK, BERTH, SLIP, along, aside, stop_line
 from dubins_traffic.policies.rules.tables import Driver, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
+from dubins_traffic.roads.lookup import INFINITE
 from dubins_traffic.rules.propositions import FLAG
 
 SLOW = 0.05
@@ -63,8 +64,12 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
         stands = labels.bits[b, j] & FLAG.STANDS != 0 or abs(state.speed[b, j]) < SLOW
         if stands and own - length < key <= car.until:
             return speed
-        if stands and abs(key - own) < length and goes_farther(key, vehicle, car):
-            return speed
+        if stands and abs(key - own) < length:
+            if goes_farther(key, vehicle, car):
+                return speed
+            if labels.bits[b, j] & FLAG.STANDS != 0:
+                car.until = -INFINITE  # It returns behind that one, which may wait for it.
+                return speed
         if abs(key - own) < length + BERTH:
             beside = True
             before = before or key >= own - 0.1

@@ -89,7 +89,7 @@ def move(
         pose = Pose(state.x[b, n], state.y[b, n], *heading(Line(left - offset, px, py, allowed), steep))
         safe = is_safe_from(pose, b, Command(allowed, 0.0), near, trusted, traffic, vehicle)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
-    if returns and near > 0 and vehicle.tightest == 0.0:
+    if returns and (near > 0 or allowed < CREEPS) and vehicle.tightest == 0.0:
         motion = Motion(speed, yaw_rate, safe)
         speed, yaw_rate, safe = come_back(b, n, motion, Line(left, px, py, allowed), way, near, traffic)
     if not safe and offset == 0.0 and (passes or returns or abs(left) > SLIGHT):
@@ -110,6 +110,9 @@ def move(
         if passes:
             speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
+        if passes and outside and vehicle.tightest == 0.0:
+            line = Line(across, px, py, allowed)
+            speed, yaw_rate, safe = go_aside(b, n, Motion(speed, yaw_rate, safe), line, way, near, traffic)
     if not safe:
         speed = 0.0
         if vehicle.half_length > 0.0 and not is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle):
@@ -121,6 +124,28 @@ def move(
             elif back < 0.0 and goes_on(b, n, back, outside, way, near, traffic):
                 speed = back
     return speed, yaw_rate
+
+
+@jit_rare
+def go_aside(
+    b: int, n: int, motion: Motion, line: Line, way: ReferencePath, near: int, traffic: Traffic
+) -> Motion:
+    """Return the motion of a passing car: aside and back, if `motion` straight aside is not safe or leads to no place.
+
+    So it gets past what it touches, or is as near to as it may be. `near` (count) cars are listed.
+    """
+    state, vehicle = traffic.state, traffic.drivers.vehicle[b]
+    c, s, safe = state.c[b, n], state.s[b, n], motion.safe
+    if safe and motion.speed == 0.0:
+        pose = Pose(state.x[b, n], state.y[b, n], *heading(line, SQUARE))
+        safe = is_safe_from(pose, b, Command(line.speed, 0.0), near, -1, traffic, vehicle)
+    if safe:
+        return motion
+    speed, yaw_rate = steer(
+        c, s, -line.left, -line.px, -line.py, 0.0, line.speed, STEEP, EXACT, vehicle.yaw_most, 0.0, vehicle.period
+    )  # fmt: skip
+    speed, yaw_rate = keep_right(b, n, speed, yaw_rate, True, way, traffic)
+    return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
 
 
 @jit_rare
