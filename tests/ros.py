@@ -39,6 +39,10 @@ def need_compiler() -> None:
     need_programs("make", "g++")
 
 
+CARS = ("ego", "0", "-0.3", "0", "agent0", "3", "3", "0")
+"""The cars of a world outside, as `tests/cars_outside.py` takes them."""
+
+
 class Graph:
     """What runs on one ROS master; `close` ends all of it."""
 
@@ -97,10 +101,9 @@ class Graph:
 
     def world(self, fault: str = "none") -> subprocess.Popen[str]:
         """Start the world of tests/ros_world.py, with the ego and a car `agent0`."""
-        cars = ("ego", "0", "-0.3", "0", "agent0", "3", "3", "0")
         generated = self.client_messages()
         return self.start(
-            [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", fault, *cars], PYTHONPATH=str(generated)
+            [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", fault, *CARS], PYTHONPATH=str(generated)
         )
 
     def client_messages(self) -> Path:

@@ -10,12 +10,14 @@ from pathlib import Path
 from zipfile import ZipFile
 
 from dubins_traffic.competition.templates import write_template
+from tests.beside import running
 from tests.ports import kept_port
 from tests.reader import Reader
-from tests.ros import graph
+from tests.ros import CARS, ROOT, graph
 from tests.services import serving
 from tests.shown import Block
 from tests.shown_files import DRIVER
+from tests.tools import interpreter_with
 
 
 def beside(code: str, until: str) -> Callable[[Reader], None]:
@@ -97,6 +99,13 @@ def world_of_cars(reader: Reader) -> None:
     ros = reader.stack.enter_context(graph(reader.notes))
     reader.around |= {name: ros.environment[name] for name in ros.environment if name.startswith("ROS_")}
     ros.world()
+
+
+def world_of_cars_over_ros2(reader: Reader) -> None:
+    """Let cars be somewhere else, in a domain of this test."""
+    reader.around["ROS_DOMAIN_ID"] = "84"
+    world = (interpreter_with("jazzy"), str(ROOT / "tests" / "ros2_world.py"), "none", *CARS)
+    reader.stack.enter_context(running(*world, env=reader.around))
 
 
 def program(folder: Path) -> None:

@@ -27,6 +27,7 @@ from tests.shown_beside import (
     started_over_ros2,
     typed,
     world_of_cars,
+    world_of_cars_over_ros2,
 )
 from tests.shown_files import (
     DRIVER,
@@ -141,7 +142,9 @@ PAGES: dict[str, Page] = {
     "extending/simulator.md": Page(there=(recorded("demo"), file_of("examples/extending/my_simulator.py"))),
     "extending/transport.md": Page(),
     "external-worlds.md": Page(
-        there=(files(floor__json=dumps(FLOOR)),), needs=(need_ros,), before={"--records out": world_of_cars}
+        there=(files(floor__json=dumps(FLOOR)),),
+        needs=(need_ros,),
+        before={"--records out": world_of_cars, "ros2-world": world_of_cars_over_ros2},
     ),
     "falsify.md": Page(),
     "foreign-strategies.md": Page(

@@ -20,7 +20,7 @@ from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import LAST_DOMAIN, Graph
 from dubins_traffic.transports.ros2.transport import INSTANCE
 from tests.integration.test_rclpy import COMMAND, PATIENCE, ROOT, VERSIONS, beside
-from tests.ros import configuration
+from tests.ros import CARS, configuration
 from tests.tools import interpreter_with
 
 pytestmark = pytest.mark.tools
@@ -31,7 +31,6 @@ COURSE: dict[str, Any] = {
     "number_trials": 1,
     "e-agents": [{"type": "scripted", "name": "agent0", "parameters": {"commands": [[9, 0.2, 0.0]]}}],
 }
-CARS = ("ego", "0", "-0.3", "0", "agent0", "3", "3", "0")
 SMOOTH = f"{ROOT}/tests/smooth.py:Smooth"
 
 
