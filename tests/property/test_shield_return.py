@@ -55,6 +55,12 @@ def along(state: State, n: int) -> float:
 def keeps_beside(n: int, state: State) -> tuple[float, float]:
     """Move up beside the ego, a little ahead of it, and stop when it stops; this breaks neither E1 nor E2."""
     ahead = along(state, EGO) + 0.1 - along(state, n)
+    return min(max(ahead / PERIOD, 0.0), FASTEST), 0.0
+
+
+def goes_back_with(n: int, state: State) -> tuple[float, float]:
+    """Do so, and back up with the ego, too, however far."""
+    ahead = along(state, EGO) + 0.1 - along(state, n)
     return min(max(ahead / PERIOD, -0.05), FASTEST), 0.0
 
 
@@ -118,6 +124,15 @@ def test_a_car_that_keeps_beside_the_ego(overtakes: Overtakes) -> None:
     assert broken(score, "other") & {"2.left", "2.turn", "1.collision", "E2"} == set()
     assert (spans != []) == (overtakes == "law")
     assert overtakes != "law" or max(spans) * PERIOD > 10.0
+
+
+def test_a_car_that_goes_back_beside_the_ego_turns() -> None:
+    """The ego falls back behind it, where it may not follow for long."""
+    score, _ = opposed(
+        on_grid([standing(3.0, -W)], 40.0, START), goes_back_with, Shield("rules", overtakes="law")
+    )
+    assert broken(score, "ego") == set()
+    assert "2.turn" in broken(score, "other")
 
 
 @pytest.mark.parametrize("x", [0.2, 0.8, 2.2, 4.0, 4.6, 5.2, 5.8, 6.4, 7.0, 7.6])
