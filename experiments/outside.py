@@ -10,23 +10,22 @@ scripts/system-packages.sh and scripts/crosscheck-tools.sh install.
 
 from __future__ import annotations
 
-import os
 import sys
 import tempfile
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.table import Row, show
-from tests.beside import running
-from tests.ros import Graph, configuration, finish, graph
+from tests.beside import in_domain
+from tests.ports import kept_domain
+from tests.ros import ROOT, configuration, finish, graph
 from tests.tools import interpreter_with
 
 import dubins_traffic as dt
+from dubins_traffic.scoring.verdict import Ruling, Verdict
 
-ROOT: Final = Path(__file__).resolve().parents[1]
 FLOOR, SLOW_FLOOR = "0.05,0.005,0.05", "0.3,0.0,0.0"
 """What worlds do, as tests/cars_outside.py has it: seconds late, metres of noise, share of commands lost."""
 TRIALS: Final = 10
@@ -40,27 +39,22 @@ TRIAL: Final[dict[str, Any]] = {
 }
 """What is driven, beside the defaults of `tests.ros.configuration`."""
 SEED: Final = 3
-DOMAIN: Final = 140
 NOTICED: Final = "take effect about"
 """What a session says of a delay that is not declared."""
 
 
 @dataclass(frozen=True, slots=True)
 class Came:
-    """What came of a trial: the record's verdict, and what the session said."""
+    """What came of a trial: the verdict, the ticks of delay that were declared, and what the session said."""
 
-    record: dt.Record
+    verdict: Verdict
+    ticks: int
     said: str
 
     @property
-    def verdict(self) -> Any:
-        """The verdict."""
-        return dt.score(self.record).verdict
-
-    @property
-    def wrong(self) -> bool:
-        """Whether the ego broke a rule as measured, and that is not said to be untold."""
-        return bool(self.verdict.own_violations) and self.verdict.verdict != "untold"
+    def untold(self) -> bool:
+        """Whether it can't be told what came of it."""
+        return self.verdict.verdict is Ruling.UNTOLD
 
 
 def cars(instance: dt.Instance) -> list[str]:
@@ -72,26 +66,16 @@ def cars(instance: dt.Instance) -> list[str]:
 def over_ros1(config: Path, instance: dt.Instance, floor: str, *options: str) -> str:
     """Run a session over ROS 1 beside a world of its own; return what it said."""
     with graph(config.parent) as ros:
-        return _session_of(ros, config, instance, floor, *options)
-
-
-def _session_of(ros: Graph, config: Path, instance: dt.Instance, floor: str, *options: str) -> str:
-    messages = ros.client_messages()
-    world = ["/usr/bin/python3", ROOT / "tests" / "ros_world.py", floor, *cars(instance)]
-    ros.start(world, PYTHONPATH=str(messages))
-    return _said(finish(ros.session(config, *options, "--simulator", "ros1-world")))
+        ros.world(floor, cars(instance))
+        return _said(finish(ros.session(config, *options, "--simulator", "ros1-world")))
 
 
 def over_ros2(config: Path, instance: dt.Instance, floor: str, *options: str) -> str:
     """Run a session over ROS 2 beside a world of its own, by rclpy; return what it said."""
-    domain = str(DOMAIN + os.getpid() % 40)
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(("ROS_", "RMW_"))}
-    environment["ROS_DOMAIN_ID"] = domain
+    domain = kept_domain()
     world = (interpreter_with("jazzy"), str(ROOT / "tests" / "ros2_world.py"), floor, *cars(instance))
     session = (sys.executable, "-m", "dubins_traffic.cli", "ros2", "run", str(config), "--json", *options)
-    with ExitStack() as stack:
-        stack.enter_context(running(*world, env=environment))
-        run = stack.enter_context(running(*session, "--simulator", "ros2-world", env=environment))
+    with in_domain(domain, *world), in_domain(domain, *session, "--simulator", "ros2-world") as run:
         return _said(finish(run))
 
 
@@ -113,25 +97,26 @@ def driven(transport: str, number: int, floor: str, *options: str) -> Came:
         instance = dt.draw(dt.load_config(config), SEED + number, 0)
         told = ("--controller", "rules", "--seed", str(SEED + number), "--records", str(records), *options)
         said = OVER[transport](config, instance, floor, *told)
-        return Came(dt.load_record(records / "trial-0000.mcap"), said)
+        record = dt.load_record(records / "trial-0000.mcap")
+        verdict = dt.score(record).verdict
+        assert verdict is not None
+        return Came(verdict, record.instance.disturbances.command_delay, said)
 
 
 def rows(transport: str, trials: int) -> list[Row]:
     """Return the rows of one transport."""
     every = [driven(transport, number, FLOOR) for number in range(trials)]
     unseen = driven(transport, 0, SLOW_FLOOR, "--delay", "0", "--noise", "0.005")
-    broken = [own.verdict.own_violations[0].rule for own in every if own.wrong]
-    satisfied, clean = (
-        sum(own.verdict.verdict == "satisfied" for own in every),
-        sum(own.verdict.clean for own in every),
+    broken = sorted(
+        own.verdict.own_violations[0].rule for own in every if own.verdict.own_violations and not own.untold
     )
-    untold = sum(own.verdict.verdict == "untold" for own in every)
-    rounds = sum(own.verdict.rounds for own in every)
-    ticks = [own.record.instance.disturbances.command_delay for own in every]
+    satisfied = sum(own.verdict.verdict is Ruling.SATISFIED for own in every)
+    clean, untold = sum(own.verdict.clean for own in every), sum(own.untold for own in every)
+    rounds, ticks = sum(own.verdict.rounds for own in every), [own.ticks for own in every]
     return [
         Row(
             f"{transport}: trials of {trials} in which `rules` breaks a rule, and that is not named untold",
-            f"{len(broken)}" + (f" ({', '.join(sorted(broken))})" if broken else ""),
+            f"{len(broken)}" + (f" ({', '.join(broken)})" if broken else ""),
             "0",
             not broken,
         ),

@@ -21,6 +21,8 @@ from dubins_traffic.transports.ros1.messages import DIST_PACKAGES, write_python
 from tests.ports import kept_port
 from tests.tools import need, need_programs
 
+CARS = ("ego", "0", "-0.3", "0", "agent0", "3", "3", "0")
+"""The cars of a world outside, as `tests/cars_outside.py` takes them."""
 ROOT = Path(__file__).resolve().parents[1]
 SYSTEM_PYTHON = "/usr/bin/python3"
 PATIENCE = 600.0
@@ -37,10 +39,6 @@ def need_ros() -> None:
 def need_compiler() -> None:
     """Skip the test, or fail it under CI, where no program in C++ can be made."""
     need_programs("make", "g++")
-
-
-CARS = ("ego", "0", "-0.3", "0", "agent0", "3", "3", "0")
-"""The cars of a world outside, as `tests/cars_outside.py` takes them."""
 
 
 class Graph:
@@ -99,11 +97,11 @@ class Graph:
             [SYSTEM_PYTHON, ROOT / "tests" / "ros_client.py", *actions], PYTHONPATH=str(generated)
         )
 
-    def world(self, fault: str = "none") -> subprocess.Popen[str]:
-        """Start the world of tests/ros_world.py, with the ego and a car `agent0`."""
+    def world(self, fault: str = "none", cars: Sequence[str] = CARS) -> subprocess.Popen[str]:
+        """Start the world of tests/ros_world.py, by default with the ego and a car `agent0`."""
         generated = self.client_messages()
         return self.start(
-            [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", fault, *CARS], PYTHONPATH=str(generated)
+            [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", fault, *cars], PYTHONPATH=str(generated)
         )
 
     def client_messages(self) -> Path:

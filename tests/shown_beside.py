@@ -11,7 +11,7 @@ from zipfile import ZipFile
 
 from dubins_traffic.competition.templates import write_template
 from tests.beside import running
-from tests.ports import kept_port
+from tests.ports import kept_domain, kept_port
 from tests.reader import Reader
 from tests.ros import CARS, ROOT, graph
 from tests.services import serving
@@ -46,9 +46,14 @@ def lcm_port() -> int:
     return kept_port()
 
 
+@cache
+def own_domain() -> int:
+    return kept_domain()
+
+
 def own_graphs() -> dict[str, str]:
     return {
-        "ROS_DOMAIN_ID": "83",
+        "ROS_DOMAIN_ID": str(own_domain()),
         "ROS_IP": "127.0.0.1",
         "LCM_DEFAULT_URL": f"udpm://239.255.76.67:{lcm_port()}?ttl=0",
     }
@@ -102,8 +107,7 @@ def world_of_cars(reader: Reader) -> None:
 
 
 def world_of_cars_over_ros2(reader: Reader) -> None:
-    """Let cars be somewhere else, in a domain of this test."""
-    reader.around["ROS_DOMAIN_ID"] = "84"
+    """Let cars be somewhere else, in the domain of the page."""
     world = (interpreter_with("jazzy"), str(ROOT / "tests" / "ros2_world.py"), "none", *CARS)
     reader.stack.enter_context(running(*world, env=reader.around))
 

@@ -16,7 +16,7 @@ import pytest
 import typer
 
 from dubins_traffic.cli.commands import app
-from tests.ports import kept_port
+from tests.ports import kept_domain, kept_port
 from tests.ros import PATIENCE, ROOT, Graph, configuration, graph, need_ros, read_until
 from tests.tools import need_module
 
@@ -66,7 +66,7 @@ def test_an_example_of_a_session_runs_and_says_what_it_does(line: str, tmp_path:
     own_core = kind == "ros1" and "--master" not in line
     with graph(tmp_path, core=own_core) as ros:
         command = [sys.executable, "-m", "dubins_traffic.cli", *shlex.split(line)]
-        around = {**ros.environment, "ROS_DOMAIN_ID": "77", "PYTHONPATH": str(ROOT / "src")}
+        around = {**ros.environment, "ROS_DOMAIN_ID": str(kept_domain()), "PYTHONPATH": str(ROOT / "src")}
         process = subprocess.Popen(command, cwd=tmp_path, env=around, stderr=subprocess.PIPE, text=True)
         said = read_until(process, r"\((1 of \d+)\): (waiting for|begins)")
         os.kill(process.pid, signal.SIGTERM)

@@ -5,13 +5,11 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import os
 import signal
 import subprocess
 import sys
-from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -21,8 +19,8 @@ pytest.importorskip("cyclonedds")
 
 import dubins_traffic as dt
 from dubins_traffic.transports.ros2 import messages as m
-from dubins_traffic.transports.ros2.graph import LAST_DOMAIN
-from tests.beside import running
+from tests.beside import in_domain
+from tests.ports import kept_domain
 from tests.tools import interpreter_with
 
 pytestmark = pytest.mark.tools
@@ -32,14 +30,7 @@ COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
 NODE = str(ROOT / "examples" / "ros2" / "node.py")
 VERSIONS = ("jazzy", "kilted")
 TRIALS = os.environ.get("DUBINS_TRAFFIC_TRIALS_ROS2", "3")
-DOMAINS = itertools.count(LAST_DOMAIN - 6 * (os.getpid() % 15), -1)
 PATIENCE = 900
-
-
-def beside(domain: int, *command: str) -> AbstractContextManager[subprocess.Popen[str]]:
-    """Run a program in a domain, with ROS 2's defaults else."""
-    environment = {name: value for name, value in os.environ.items() if not name.startswith(("ROS_", "RMW_"))}
-    return running(*command, env=environment | {"ROS_DOMAIN_ID": str(domain)})
 
 
 def session(config: str, *more: str) -> tuple[str, ...]:
@@ -82,11 +73,11 @@ def test_types_have_the_hashes_of_ros_2(version: str) -> None:
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_node_drives_trial_after_trial(version: str, config: str, tmp_path: Path) -> None:
-    domain, python = next(DOMAINS), interpreter_with(version)
+    domain, python = kept_domain(), interpreter_with(version)
     arguments = session(
         config, "--lockstep", "--deadline", "60", "--trials", TRIALS, "--records", str(tmp_path / "out")
     )
-    with beside(domain, *arguments) as run, beside(domain, python, NODE) as node:
+    with in_domain(domain, *arguments) as run, in_domain(domain, python, NODE) as node:
         assert ends(run) == ["duration"] * int(TRIALS)
         ended_by_ctrl_c(node)
     driven = {float(dt.load_record(path).frames.x[-1, 0]) for path in (tmp_path / "out").glob("*.mcap")}
@@ -95,10 +86,10 @@ def test_a_node_drives_trial_after_trial(version: str, config: str, tmp_path: Pa
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_session_is_seen_as_a_node(version: str) -> None:
-    domain, python = next(DOMAINS), interpreter_with(version)
+    domain, python = kept_domain(), interpreter_with(version)
     with (
-        beside(domain, *session("demo", "--trials", "1")) as run,
-        beside(domain, python, str(ROOT / "tests" / "rclpy_look.py"), "/ego/odom") as look,
+        in_domain(domain, *session("demo", "--trials", "1")) as run,
+        in_domain(domain, python, str(ROOT / "tests" / "rclpy_look.py"), "/ego/odom") as look,
     ):
         out, err = look.communicate(timeout=PATIENCE)
         assert err == ""
@@ -118,12 +109,12 @@ def test_two_sessions_in_two_domains(tmp_path: Path) -> None:
     for version, seconds in zip(VERSIONS, (4, 6), strict=True):
         documents[version] = dt.load_config("demo").to_document() | {"duration_bounds": [seconds, seconds]}
         (tmp_path / f"{version}.json").write_text(json.dumps(documents[version]))
-    first, second = next(DOMAINS), next(DOMAINS)
+    first, second = kept_domain(), kept_domain()
     with (
-        beside(first, *session(str(tmp_path / "jazzy.json"), "--trials", "2")) as one,
-        beside(second, *session(str(tmp_path / "kilted.json"), "--trials", "2")) as other,
-        beside(first, interpreter_with("jazzy"), NODE) as node,
-        beside(second, interpreter_with("kilted"), NODE) as another,
+        in_domain(first, *session(str(tmp_path / "jazzy.json"), "--trials", "2")) as one,
+        in_domain(second, *session(str(tmp_path / "kilted.json"), "--trials", "2")) as other,
+        in_domain(first, interpreter_with("jazzy"), NODE) as node,
+        in_domain(second, interpreter_with("kilted"), NODE) as another,
     ):
         assert ends(one) == ["duration"] * 2
         assert ends(other) == ["duration"] * 2
@@ -134,11 +125,11 @@ def test_two_sessions_in_two_domains(tmp_path: Path) -> None:
 @pytest.mark.parametrize("version", VERSIONS)
 def test_a_killed_node_is_lost_at_once(version: str, tmp_path: Path) -> None:
     """DDS itself would notice after twenty seconds; the silence that is borne here is longer."""
-    domain, python = next(DOMAINS), interpreter_with(version)
+    domain, python = kept_domain(), interpreter_with(version)
     document = dt.load_config("demo").to_document() | {"duration_bounds": [1000, 1000]}
     (tmp_path / "long.json").write_text(json.dumps(document))
     arguments = session(str(tmp_path / "long.json"), "--trials", "1", "--silence", "900")
-    with beside(domain, *arguments) as run, beside(domain, python, NODE) as node:
+    with in_domain(domain, *arguments) as run, in_domain(domain, python, NODE) as node:
         assert run.stderr is not None
         for line in run.stderr:
             if "first command" in line:

@@ -10,15 +10,18 @@ import pytest
 import dubins_traffic as dt
 from dubins_traffic.record.sink import End
 from dubins_traffic.sessions.plan import rehearse
-from tests.ros import ROOT, Graph, configuration, finish, graph, need_ros
+from tests.judged_outside import (
+    COURSE,
+    FAULTS,
+    SMOOTH,
+    require_driven,
+    require_lost,
+    require_measured,
+    verified,
+)
+from tests.ros import Graph, configuration, finish, graph, need_ros
 
 pytestmark = pytest.mark.tools
-
-COURSE = {
-    "duration": 3.0,
-    "number_trials": 1,
-    "e-agents": [{"type": "scripted", "name": "agent0", "parameters": {"commands": [[9, 0.2, 0.0]]}}],
-}
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -33,30 +36,21 @@ def run(ros: Graph, folder: Path, fault: str, **more: object) -> dt.Record:
         "--simulator",
         "ros1-world",
         "--controller",
-        f"{ROOT}/tests/smooth.py:Smooth",
+        SMOOTH,
         "--records",
         records,
     ]
     status, _, err = finish(ros.session(configuration(folder, **{**COURSE, **more}), *options))
     assert status in (0, 1), err
     (folder / "said").write_text(err)
-    found = dt.verify(records / "trial-0000.mcap")
-    assert found.verified, found
-    assert found.world == "ros1-world"
-    return dt.load_record(records / "trial-0000.mcap")
+    return verified(records, "ros1-world")
 
 
 def test_cars_elsewhere_are_driven_and_judged_here(tmp_path: Path) -> None:
     need_ros()
     with graph(tmp_path) as ros:
         record = run(ros, tmp_path, "none")
-    assert record.ending is not None
-    assert record.ending.end is End.DURATION
-    frames = record.frames
-    assert len(frames) == 91
-    assert (frames.x[0, 0], frames.y[0, 0]) == (0.0, -0.3)
-    assert frames.x[-1, 0] > 0.3
-    assert frames.x[-1, 1] - frames.x[0, 1] == pytest.approx(0.6, abs=0.1)
+    require_driven(record)
     sheet = dt.score(record)
     assert sheet.icra2016 is not None
 
@@ -78,14 +72,12 @@ def test_a_node_drives_the_ego_and_a_tracker_sees_the_cars(tmp_path: Path) -> No
     assert record.frames.x[-1, 0] > 0.3
 
 
-@pytest.mark.parametrize(("fault", "word"), [("freeze", "frozen"), ("jump", "jumped"), ("stop", "no pose")])
+@pytest.mark.parametrize(("fault", "word"), FAULTS)
 def test_a_world_that_fails_ends_the_trial_with_its_reason(tmp_path: Path, fault: str, word: str) -> None:
     need_ros()
     with graph(tmp_path) as ros:
         record = run(ros, tmp_path, fault, duration=20.0)
-    assert record.ending is not None
-    assert record.ending.end is End.WORLD_LOST
-    assert word in record.ending.detail
+    require_lost(record, word)
 
 
 def test_a_car_that_is_nowhere(tmp_path: Path) -> None:
@@ -104,20 +96,14 @@ def test_a_world_is_measured_before_its_first_trial(tmp_path: Path) -> None:
     need_ros()
     with graph(tmp_path) as ros:
         record = run(ros, tmp_path, "0.05,0.005,0.0", rules=False, duration=2.0)
-    declared = record.instance.disturbances
-    assert declared.cars == "all"
-    # 50 ms, poses up to 37 ms old, and a tick; more on a busy machine.
-    assert 3 <= declared.command_delay <= 8
-    assert 0.001 < declared.position_noise < 0.0025
-    assert "commands take effect late" in (tmp_path / "said").read_text()
-    assert record.instance.problem.command_delay == declared.command_delay
+    require_measured(record, (tmp_path / "said").read_text())
 
 
 def test_a_delay_that_is_declared_is_not_measured(tmp_path: Path) -> None:
     need_ros()
     with graph(tmp_path) as ros:
         ros.world()
-        options = ["--simulator", "ros1-world", "--controller", f"{ROOT}/tests/smooth.py:Smooth"]
+        options = ["--simulator", "ros1-world", "--controller", SMOOTH]
         options += ["--records", str(tmp_path / "out"), "--delay", "0.3", "--noise", "0.03"]
         status, _, err = finish(ros.session(configuration(tmp_path, **{**COURSE, "duration": 1.0}), *options))
     assert status in (0, 1), err

@@ -1,9 +1,7 @@
 """`dubins-traffic ros2 run`: process to process by Cyclone DDS, and against another implementation, Fast DDS."""
 
-import itertools
 import json
 import math
-import os
 import signal
 import subprocess
 import sys
@@ -23,12 +21,12 @@ from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
 from tests.beside import running
 from tests.conformance.transport import frames
+from tests.ports import kept_domain
 from tests.ros2_client import READY, RESET, RESTART, START, Client, law
 from tests.tools import need, program
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
-DOMAINS = itertools.count(20 + 20 * (os.getpid() % 10))
 LIBRARIES = ("-lfastrtps", "-lfastcdr")
 
 
@@ -51,7 +49,7 @@ def _compiled() -> None:
 
 @pytest.fixture
 def domain(monkeypatch: pytest.MonkeyPatch) -> int:
-    number = next(DOMAINS)
+    number = kept_domain()
     monkeypatch.setenv("ROS_DOMAIN_ID", str(number))
     return number
 

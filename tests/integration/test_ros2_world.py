@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import itertools
 import json
-import os
 import re
 from pathlib import Path
 from typing import Any
@@ -17,21 +15,24 @@ import dubins_traffic as dt
 from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.record.sink import End
 from dubins_traffic.transports.ros2 import messages as m
-from dubins_traffic.transports.ros2.graph import LAST_DOMAIN, Graph
+from dubins_traffic.transports.ros2.graph import Graph
 from dubins_traffic.transports.ros2.transport import INSTANCE
-from tests.integration.test_rclpy import COMMAND, PATIENCE, ROOT, VERSIONS, beside
-from tests.ros import CARS, configuration
+from tests.beside import in_domain
+from tests.integration.test_rclpy import COMMAND, PATIENCE, VERSIONS
+from tests.judged_outside import (
+    COURSE,
+    FAULTS,
+    SMOOTH,
+    require_driven,
+    require_lost,
+    require_measured,
+    verified,
+)
+from tests.ports import kept_domain
+from tests.ros import CARS, ROOT, configuration
 from tests.tools import interpreter_with
 
 pytestmark = pytest.mark.tools
-
-DOMAINS = itertools.count(LAST_DOMAIN - 90 - 6 * (os.getpid() % 15), -1)
-COURSE: dict[str, Any] = {
-    "duration": 3.0,
-    "number_trials": 1,
-    "e-agents": [{"type": "scripted", "name": "agent0", "parameters": {"commands": [[9, 0.2, 0.0]]}}],
-}
-SMOOTH = f"{ROOT}/tests/smooth.py:Smooth"
 
 
 def world(version: str, fault: str) -> tuple[str, ...]:
@@ -45,52 +46,37 @@ def session(folder: Path, *options: str, **more: Any) -> tuple[str, ...]:
 
 
 def judged(folder: Path, fault: str, version: str = "jazzy", **more: Any) -> tuple[dt.Record, str]:
-    domain = next(DOMAINS)
+    domain = kept_domain()
     arguments = session(folder, "--controller", SMOOTH, **more)
-    with beside(domain, *world(version, fault)), beside(domain, *arguments) as run:
+    with in_domain(domain, *world(version, fault)), in_domain(domain, *arguments) as run:
         out, err = run.communicate(timeout=PATIENCE)
     assert run.returncode in (0, 1), out + err
-    found = dt.verify(folder / "out" / "trial-0000.mcap")
-    assert found.verified, found
-    assert found.world == "ros2-world"
-    return dt.load_record(folder / "out" / "trial-0000.mcap"), err
+    return verified(folder / "out", "ros2-world"), err
 
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_cars_elsewhere_are_driven_and_judged_here(version: str, tmp_path: Path) -> None:
     record, _ = judged(tmp_path, "none", version)
-    assert record.ending is not None
-    assert record.ending.end is End.DURATION
-    frames = record.frames
-    assert len(frames) == 91
-    assert (frames.x[0, 0], frames.y[0, 0]) == (0.0, -0.3)
-    assert frames.x[-1, 0] > 0.3
-    assert frames.x[-1, 1] - frames.x[0, 1] == pytest.approx(0.6, abs=0.1)
+    require_driven(record)
 
 
-@pytest.mark.parametrize(("fault", "word"), [("freeze", "frozen"), ("jump", "jumped"), ("stop", "no pose")])
+@pytest.mark.parametrize(("fault", "word"), FAULTS)
 def test_a_world_that_fails_ends_the_trial_with_its_reason(tmp_path: Path, fault: str, word: str) -> None:
     record, _ = judged(tmp_path, fault, duration=20.0)
-    assert record.ending is not None
-    assert record.ending.end is End.WORLD_LOST
-    assert word in record.ending.detail
+    require_lost(record, word)
 
 
 def test_a_world_is_measured_before_its_first_trial(tmp_path: Path) -> None:
     record, said = judged(tmp_path, "0.05,0.005,0.0", rules=False, duration=2.0)
-    declared = record.instance.disturbances
-    # 50 ms, poses up to 37 ms old, and a tick; more on a busy machine.
-    assert 3 <= declared.command_delay <= 8
-    assert 0.001 < declared.position_noise < 0.0025
-    assert "commands take effect late" in said
+    require_measured(record, said)
 
 
 def test_a_node_drives_the_ego_and_another_maestro_starts_and_ends_the_trial(tmp_path: Path) -> None:
     """What it tells is what ROS 2's latched topic of the problem carries; the cars stay where they are."""
-    domain = next(DOMAINS)
+    domain = kept_domain()
     problem = instance_to_document(dt.draw(dt.load_config(configuration(tmp_path, **COURSE))), version=0)
     arguments = session(tmp_path, "--maestro-elsewhere", duration=2.0)
-    with beside(domain, *world("jazzy", "none")), beside(domain, *arguments) as run:
+    with in_domain(domain, *world("jazzy", "none")), in_domain(domain, *arguments) as run:
         graph = Graph(domain)
         told = graph.writer(INSTANCE, m.String, latched=True)
         poses = graph.reader("rt/ego/pose", m.PoseStamped, lossy=True)
@@ -123,7 +109,7 @@ def test_options_that_don_t_go_together_are_refused(tmp_path: Path) -> None:
         (("--poses", "/pose"), "--poses: not a topic for every car"),
         (("--simulator", "ros1-world"), "--simulator: a world of another transport"),
     ):
-        with beside(next(DOMAINS), *session(tmp_path, "--controller", SMOOTH, *options)) as run:
+        with in_domain(kept_domain(), *session(tmp_path, "--controller", SMOOTH, *options)) as run:
             _, err = run.communicate(timeout=PATIENCE)
         assert run.returncode == 2
         assert word in err

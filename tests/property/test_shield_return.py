@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import pytest
@@ -52,16 +53,13 @@ def along(state: State, n: int) -> float:
     return float(state.x[0, n] * math.cos(TURN) + state.y[0, n] * math.sin(TURN))
 
 
-def keeps_beside(n: int, state: State) -> tuple[float, float]:
-    """Move up beside the ego, a little ahead of it, and stop when it stops; this breaks neither E1 nor E2."""
-    ahead = along(state, EGO) + 0.1 - along(state, n)
-    return min(max(ahead / PERIOD, 0.0), FASTEST), 0.0
+def keeps_beside(n: int, state: State, slowest: float = 0.0) -> tuple[float, float]:
+    """Move up beside the ego, a little ahead of it, and stop when it stops; this breaks neither E1 nor E2.
 
-
-def goes_back_with(n: int, state: State) -> tuple[float, float]:
-    """Do so, and back up with the ego, too, however far."""
+    Or back up with it, too, however far: `slowest` is negative then, m/s.
+    """
     ahead = along(state, EGO) + 0.1 - along(state, n)
-    return min(max(ahead / PERIOD, -0.05), FASTEST), 0.0
+    return min(max(ahead / PERIOD, slowest), FASTEST), 0.0
 
 
 def hunts(n: int, state: State) -> tuple[float, float]:
@@ -128,9 +126,8 @@ def test_a_car_that_keeps_beside_the_ego(overtakes: Overtakes) -> None:
 
 def test_a_car_that_goes_back_beside_the_ego_turns() -> None:
     """The ego falls back behind it, where it may not follow for long."""
-    score, _ = opposed(
-        on_grid([standing(3.0, -W)], 40.0, START), goes_back_with, Shield("rules", overtakes="law")
-    )
+    instance = on_grid([standing(3.0, -W)], 40.0, START)
+    score, _ = opposed(instance, partial(keeps_beside, slowest=-0.05), Shield("rules", overtakes="law"))
     assert broken(score, "ego") == set()
     assert "2.turn" in broken(score, "other")
 

@@ -13,8 +13,6 @@ from dubins_traffic.sessions.plan import Pace, SessionPlan, moved_by
 from dubins_traffic.transports.external import ExternalWorld, Wire
 from dubins_traffic.transports.tracked import Measured
 
-NOT_A_TOPIC = "such as /{}/pose"
-
 
 @dataclass(frozen=True, slots=True)
 class Outside:
@@ -53,9 +51,8 @@ class Outside:
                 expected = f"--simulator {self.world}"
                 raise InputError("is of another world", file=option, value=value, expected=expected)
         if self.poses is not None and "{}" not in self.poses:
-            raise InputError(
-                "not a topic for every car", file="--poses", value=self.poses, expected=NOT_A_TOPIC
-            )
+            expected = "such as /{}/pose"
+            raise InputError("not a topic for every car", file="--poses", value=self.poses, expected=expected)
         if self and (pace.lockstep or clock or pace.factor != 1.0):
             expected = "neither --lockstep nor --clock nor --factor"
             raise InputError("a world outside has its own time", file="--simulator", expected=expected)

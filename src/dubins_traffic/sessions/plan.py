@@ -24,7 +24,7 @@ from dubins_traffic.files import locked
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.configuration import Configuration
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.instance import Instance
+from dubins_traffic.problem.instance import OUTSIDE, Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.problem.parts import Laser
 from dubins_traffic.protocols import Clock, Controller, Simulator, Transport
@@ -296,7 +296,8 @@ def session_plan(
 def rehearse(instance: Instance, *, shield: bool = False) -> None:
     """Run about a second of `instance` without drivers, so that all kernels are compiled before time counts.
 
-    The ego drives under the shield if `shield`, and every laser sweeps once, as for a peer that receives scans.
+    The ego drives under the shield if `shield`, and every laser sweeps once, as for a peer that receives scans. Cars of
+    a world outside are not told to move yet: embedded ones move in their place.
     """
     agents = tuple(
         replace(agent, kind="scripted", parameters={"commands": [], "repeat": False})
@@ -304,7 +305,9 @@ def rehearse(instance: Instance, *, shield: bool = False) -> None:
         else agent
         for agent in instance.e_agents
     )
-    brief = replace(instance, e_agents=agents, duration=min(instance.duration, REHEARSAL))
+    simulator = "embedded" if instance.simulator in OUTSIDE else instance.simulator
+    duration = min(instance.duration, REHEARSAL)
+    brief = replace(instance, e_agents=agents, duration=duration, simulator=simulator)
     nobody: Controller = Scripted(np.zeros((brief.ticks, 2)))
     run_trial(brief, controllers.under_shield(nobody) if shield else nobody)
     state = State.zeros(1, len(brief.starts))

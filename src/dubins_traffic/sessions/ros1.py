@@ -62,12 +62,11 @@ def run_over_ros1(
         If an instance can't be drawn.
     """
     outside = Outside(WORLD, simulator, poses, delay, noise)
-    undriven = session_plan
     session_plan = outside.planned(session_plan, pace, clock=clock, elsewhere=elsewhere)
     maestro = Maestro() if session_plan.controller is None and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
     session_plan = session_plan.claim(Ros1.name)
-    (undriven if outside else session_plan).rehearse()
+    session_plan.rehearse()
     with ExitStack() as stack:
         uri = os.environ.get("ROS_MASTER_URI", DEFAULT_URI)
         if master:

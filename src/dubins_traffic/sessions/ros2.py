@@ -73,7 +73,6 @@ def run_over_ros2(
         If ``ROS_DOMAIN_ID`` is no domain, or an instance can't be drawn.
     """
     outside = Outside(WORLD, simulator, poses, delay, noise)
-    undriven = session_plan
     session_plan = outside.planned(session_plan, pace, clock=clock, elsewhere=elsewhere)
     maestro = Maestro() if session_plan.controller is None and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
@@ -82,7 +81,7 @@ def run_over_ros2(
     )
     where = f"DDS domain {transport.domain}{'' if wide else ', within this machine'}"
     session_plan = session_plan.claim(transport.name)
-    (undriven if outside else session_plan).rehearse()
+    session_plan.rehearse()
 
     def make() -> tuple[ExternalWorld, Callable[[Instance], Instance]]:
         from dubins_traffic.transports.ros2.external import Ros2Wire

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from math import isfinite, sqrt
 from time import time
+from typing import Any
 
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.protocols import View
@@ -27,8 +28,9 @@ def heading(z: float, w: float) -> tuple[float, float]:
     return (w * w - z * z) / length, 2.0 * w * z / length
 
 
-def placed(x: float, y: float, z: float, w: float) -> Pose | None:
-    """Return the pose at (x, y) turned by (0, 0, z, w), None if these numbers are none of a pose."""
+def placed(told: Any) -> Pose | None:
+    """Return what a geometry_msgs/Pose tells of a car on the plane, None if its numbers are none of a pose."""
+    x, y, z, w = told.position.x, told.position.y, told.orientation.z, told.orientation.w
     if z == w == 0.0 or not all(map(isfinite, (x, y, z, w))):
         return None
     return Pose(x, y, *heading(z, w))

@@ -61,13 +61,14 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
         its = aside(way, state.x[b, j], state.y[b, j])
         if its > vehicle.middle or abs(its) > 2.0 * vehicle.middle:
             continue
-        stands = labels.bits[b, j] & FLAG.STANDS != 0 or abs(state.speed[b, j]) < SLOW
+        waits = labels.bits[b, j] & FLAG.STANDS != 0
+        stands = waits or abs(state.speed[b, j]) < SLOW
         if stands and own - length < key <= car.until:
             return speed
         if stands and abs(key - own) < length:
             if goes_farther(key, vehicle, car):
                 return speed
-            if labels.bits[b, j] & FLAG.STANDS != 0:
+            if waits:
                 car.until = -INFINITE  # It returns behind that one, which may wait for it.
                 return speed
         if abs(key - own) < length + BERTH:

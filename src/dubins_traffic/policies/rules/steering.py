@@ -86,8 +86,7 @@ def move(
     safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     # A car that turns in place to where it may not drive would turn back in the next tick, and so on for ever.
     if safe and speed == 0.0 and vehicle.tightest == 0.0 and (passes or steep == ABRUPT or offset < 0.0):
-        pose = Pose(state.x[b, n], state.y[b, n], *heading(Line(left - offset, px, py, allowed), steep))
-        safe = is_safe_from(pose, b, Command(allowed, 0.0), near, trusted, traffic, vehicle)
+        safe = leads_on(b, n, Line(left - offset, px, py, allowed), steep, near, trusted, traffic)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
     if returns and (near > 0 or allowed < CREEPS) and vehicle.tightest == 0.0:
         motion = Motion(speed, yaw_rate, safe)
@@ -134,15 +133,12 @@ def go_aside(
 
     So it gets past what it touches, or is as near to as it may be. `near` (count) cars are listed.
     """
-    state, vehicle = traffic.state, traffic.drivers.vehicle[b]
-    c, s, safe = state.c[b, n], state.s[b, n], motion.safe
-    if safe and motion.speed == 0.0:
-        pose = Pose(state.x[b, n], state.y[b, n], *heading(line, SQUARE))
-        safe = is_safe_from(pose, b, Command(line.speed, 0.0), near, -1, traffic, vehicle)
-    if safe:
+    if motion.safe and (motion.speed != 0.0 or leads_on(b, n, line, SQUARE, near, -1, traffic)):
         return motion
+    state, vehicle = traffic.state, traffic.drivers.vehicle[b]
     speed, yaw_rate = steer(
-        c, s, -line.left, -line.px, -line.py, 0.0, line.speed, STEEP, EXACT, vehicle.yaw_most, 0.0, vehicle.period
+        state.c[b, n], state.s[b, n], -line.left, -line.px, -line.py, 0.0, line.speed, STEEP, EXACT, vehicle.yaw_most,
+        0.0, vehicle.period,
     )  # fmt: skip
     speed, yaw_rate = keep_right(b, n, speed, yaw_rate, True, way, traffic)
     return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
@@ -168,20 +164,17 @@ def come_back(
     car that bars its way back, and goes straight to the right where there is room for that only.
     """
     state, vehicle = traffic.state, traffic.drivers.vehicle[b]
-    x, y = state.x[b, n], state.y[b, n]
     safe = motion.safe
     if safe and motion.speed == 0.0 and line.speed >= CREEPS:
-        pose = Pose(x, y, *heading(line, STEEP))
-        safe = is_safe_from(pose, b, Command(line.speed, 0.0), near, -1, traffic, vehicle)
-    own = along(way, x, y)
+        safe = leads_on(b, n, line, STEEP, near, -1, traffic)
+    own = along(way, state.x[b, n], state.y[b, n])
     far = own < last_return(vehicle) + NARROWLY
     back = 0.0 if far else backs_off(own, line.left, vehicle)
     if not (safe and line.speed >= CREEPS) and back <= SLANT:
         # Near the disc straight to the right to the end, or a little back: it would come into the disc, still left.
         left, on = line.left if far else 1.0, sqrt(1.0 - back * back)
         line = Line(left, line.px * on + line.py * back, line.py * on - line.px * back, SLIDES)
-        pose = Pose(x, y, *heading(line, SQUARE))
-        if is_safe_from(pose, b, Command(SLIDES, 0.0), near, -1, traffic, vehicle):
+        if leads_on(b, n, line, SQUARE, near, -1, traffic):
             speed, yaw_rate = steer(
                 state.c[b, n], state.s[b, n], left, line.px, line.py, 0.0, SLIDES, SQUARE, EXACT,
                 vehicle.yaw_most, 0.0, vehicle.period,
@@ -232,6 +225,17 @@ def backs_off(own: float, left: float, vehicle: Vehicle) -> float:
     """
     over, room = left - vehicle.middle, vehicle.disc + vehicle.reach + CLOSE
     return (room + own) / over + over / room if over > CLOSE and room + own > 0.0 else 0.0
+
+
+@jit_inline
+def leads_on(b: int, n: int, line: Line, most: float, near: int, trusted: int, traffic: Traffic) -> bool:
+    """Tell whether a car may drive, once it has turned in place, as `heading` says of its line and `most` (ratio).
+
+    `near` (count) cars are listed, `trusted` (index) need not be minded.
+    """
+    state, vehicle = traffic.state, traffic.drivers.vehicle[b]
+    pose = Pose(state.x[b, n], state.y[b, n], *heading(line, most))
+    return is_safe_from(pose, b, Command(line.speed, 0.0), near, trusted, traffic, vehicle)
 
 
 @jit_inline

@@ -66,7 +66,6 @@ class Ros1Wire:
         self._take_one(name, message.pose)
 
     def _take_one(self, name: str, told: Any) -> None:
-        position, turn = told.position, told.orientation
-        pose = placed(position.x, position.y, turn.z, turn.w)
+        pose = placed(told)
         if pose is not None:
             self._note(name, pose)

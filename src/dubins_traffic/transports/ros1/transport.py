@@ -151,8 +151,7 @@ class MaestroServices:
         return self._m.EmptyResponse()
 
     def _place(self, message: Any) -> None:
-        position, turn = message.pose.position, message.pose.orientation
-        pose = placed(position.x, position.y, turn.z, turn.w)
+        pose = placed(message.pose)
         if pose is not None:
             self._mailbox.place(message.model_name, pose)
 

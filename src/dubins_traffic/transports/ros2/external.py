@@ -52,8 +52,7 @@ class Ros2Wire:
         while True:
             for name, reader in self._readers.items():
                 for message in self._graph.take(reader, m.PoseStamped, AT_ONCE):
-                    position, turn = message.pose.position, message.pose.orientation
-                    pose = placed(position.x, position.y, turn.z, turn.w)
+                    pose = placed(message.pose)
                     if pose is not None:
                         self._note(name, pose)
             left = until - monotonic()

@@ -227,8 +227,7 @@ class Ros2:
         self._topics.serve()
         for car, reader in self._places.items():
             for message in self._graph.take(reader, m.PoseStamped, AT_ONCE):
-                position, turn = message.pose.position, message.pose.orientation
-                pose = placed(position.x, position.y, turn.z, turn.w)
+                pose = placed(message.pose)
                 if pose is not None:
                     self._mailbox.place(car, pose)
         for car, reader in self._readers.items():
