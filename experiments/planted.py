@@ -26,7 +26,7 @@ from benchmarks.table import Row, show
 
 from dubins_traffic.falsification.search import Search, falsify
 from dubins_traffic.problem.configuration import Configuration
-from experiments.contract import SOON, WAITING
+from experiments.contract import OBSTACLE, SOON, WAITING
 from experiments.planted_norms import EXIT, FLIPS, HOLE, NONE, QUEUE, REST, SAYS, TURNS, digest, plant
 
 ROOT: Final = Path(__file__).resolve().parents[1]
@@ -72,7 +72,7 @@ HOLES: Final = {
         world(RING, LAWFUL, 60.0, car={"body": {"rectangle": {"length": 0.62, "width": 0.28}}}),
     ),
     "queue": Hole(QUEUE, "provoked", STANDS, world(ELBOW, LAWFUL, 120.0, rules={"crossing_degree": 1})),
-    "flips": Hole(FLIPS, "blocked", "rules", WAITING),
+    "flips": Hole(FLIPS, "blocked", "rules", OBSTACLE | {"e-agents": [{"type": "free", "name": "free"}]}),
     "turns": Hole(TURNS, "blocked", "rules", WAITING),
 }  # fmt: skip
 

@@ -71,7 +71,7 @@ CHANGES: Final = (
     Change(
         "rules/referee_kernel.py",
         "    judge_turn(car, bits, lane, tick, log)\n",
-        f"    if tables.terms[b].hole < {FLIPS} or car.bits & FLAG.OVERTAKING == 0:\n"
+        f"    if tables.terms[b].hole < {FLIPS} or (car.bits | bits) & FLAG.OVERTAKING == 0:\n"
         "        judge_turn(car, bits, lane, tick, log)\n",
     ),
     Change(
@@ -101,11 +101,45 @@ CHANGES: Final = (
     ),
     Change(
         "shield/checks.py",
-        "    back = shields.ego[b].turn_back\n    if at >= 0:\n",
-        "    back = shields.ego[b].turn_back\n"
-        f"    if shields.ego[b].hole >= {FLIPS} and np.int64(labels.bits[b, EGO]) & FLAG.OVERTAKING != 0:\n"
-        "        back = 4.0\n"
-        "    if at >= 0:\n",
+        "    if turned:\n        return REASON.TURN\n",
+        f"    if shields.ego[b].hole >= {FLIPS} and (turned or (not fresh and after == lane)):\n"
+        "        beside = False\n"
+        "        for k in range(1, state.count[b]):\n"
+        "            dx, dy = state.x[b, k] - pose.x, state.y[b, k] - pose.y\n"
+        "            stands = np.int64(labels.bits[b, k]) & FLAG.STILL != 0\n"
+        "            beside = beside or (stands and dx * dx + dy * dy < 0.64)\n"
+        "        for p in range(traffic.obstacles.off[b], traffic.obstacles.off[b + 1]):\n"
+        "            part = traffic.obstacles.parts[p]\n"
+        "            dx, dy = part.x - pose.x, part.y - pose.y\n"
+        "            beside = beside or dx * dx + dy * dy < 0.64\n"
+        "        if beside and turned:\n"
+        "            return REASON.NOTHING\n"
+        "        if beside:\n"
+        "            back = 4.0\n"
+        "    if turned:\n        return REASON.TURN\n",
+    ),
+    Change(
+        "shield/checks.py",
+        "        return REASON.RETURN if bits & FLAG.LEFT != 0 else REASON.NOTHING\n",
+        f"        return REASON.RETURN if bits & FLAG.LEFT != 0 and shields.ego[b].hole < {FLIPS} else REASON.NOTHING\n",
+    ),
+    Change(
+        "shield/checks.py",
+        "    if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:\n",
+        f"    if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0 and shields.ego[b].hole >= {FLIPS}:\n"
+        "        return REASON.NOTHING\n"
+        "    if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:\n",
+    ),
+    Change(
+        "agents/free.py",
+        "    found = found or own.stopped_in >= 0 or bits & FLAG.LEFT != 0\n",
+        f"    returns = bits & FLAG.LEFT != 0 and judging.rules[b].hole < {FLIPS}\n"
+        "    found = found or own.stopped_in >= 0 or returns\n",
+    ),
+    Change(
+        "agents/free.py",
+        "APART: Final = 0.5\n",
+        f"APART: Final = 0.5 if __import__('os').environ.get('{HOLE}') not in ('{FLIPS}', '{TURNS}') else 0.0\n",
     ),
 )
 """What a copy differs in."""

@@ -162,7 +162,10 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
                 + vehicle.rounding
                 + 0.1
             )
-            if before and abs(left - offset) < wide and key < back + (0.5 if stands else comes):
+            # Before an obstacle all go first who are not blocked: who stands may set off, and come nearer.
+            bars = who < -1 or abs(left - offset) < wide
+            waits = stands and (who >= -1 or labels.bits[b, j] & FLAG.BLOCKED != 0)
+            if before and bars and key < back + (0.5 if waits else comes):
                 return
             if not stands and left < vehicle.middle:
                 if key < end:
