@@ -9,13 +9,14 @@ shield (`experiments.free_egos`) drives among `lawful` cars: in how many trials 
 rule? Each search ends after N trials, a million unless said otherwise, or S seconds, a day. Its folder below
 `build/contract` is of the package's sources; Ctrl-C keeps what is done, and the next call goes on. With --store the
 counts so far are kept as the result of the experiment, whatever the number of trials; another seed, on another machine
-or day, adds to those of the same sources.
+or day, adds to those of the same sources. Beside them stays the greatest count of each search of earlier sources.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from collections import defaultdict
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -54,7 +55,7 @@ A shorter time for a journey would leave a free car none in which it does as it 
 WAITING: Final = world((2, 2), 3.5, FREE, rules=SOON, duration=440)
 OBSTACLE: Final[dict[str, Any]] = {
     "version": 1, "problem_domain": "dubins_traffic", "rate": 10, "rules": SOON | {"gap_rounds": 10.0},
-    "goals": [[0, 0], [2, 1]], "duration": 440, "e-agents": FREE,
+    "goals": [[0, 0], [2, 1]], "duration": 440, "e-agents": [{"type": "free", "name": "free"}],
     "rnd": {
         "version": 0, "length": 4.5, "transform": [0, 0, 0], "shape": [2, 3],
         "segments": [[0, 0, 1, 0], [1, 0, 1, 1], [1, 1, 2, 1]],
@@ -93,15 +94,23 @@ SEARCHES: Final = {
         "any program under the shield among four lawful cars, trials of 120 s", most=1024,
     ),
     "obstacle": Wanted(
-        "rules", OBSTACLE, BLOCKED, "`rules` between two free cars on an elbow, an obstacle in the only way, 440 s",
+        "rules", OBSTACLE, BLOCKED, "`rules` and a free car on an elbow, an obstacle in the only way, trials of 440 s",
         bar=False,
+    ),
+    "obstacle-two": Wanted(
+        "rules", OBSTACLE | {"e-agents": FREE}, BLOCKED, "the same with two free cars, more than the ego bears there",
+        bar=False,
+    ),
+    "elbow-two": Wanted(
+        "rules", {key: OBSTACLE[key] for key in OBSTACLE if key != "obstacles"} | {"e-agents": FREE}, BLOCKED,
+        "the same without the obstacle", bar=False,
     ),
     "among-free": Wanted(
         "rules", AMONG_FREE, PROVOKED, "`rules` among two free cars and a lawful one, trials of 120 s", bar=False
     ),
 }  # fmt: skip
-"""The searches by name. Three measure what is not claimed: `lanes`, who meets obstacles, and lawful cars among free
-ones."""
+"""The searches by name. Those without a bar measure what is not claimed for so many trials, or not at all. On an elbow
+the ego bears one e-agent (theorem 1 of docs/theory.md)."""
 HAPPENS: Final = {
     BLOCKED: "without a visit for longer than may be, though nobody has broken a rule",
     PROVOKED: "a lawful car is the first to break a rule",
@@ -140,21 +149,35 @@ def searched(name: str, trials: int, seconds: float, seed: int, workers: int) ->
 
 
 def together(counts: Iterable[Count]) -> list[Count]:
-    """Return counts with those of other seeds that are stored of the same sources, in the order of the searches."""
+    """Return counts with those that are stored of the same sources, and of each search the greatest of earlier ones.
+
+    They are in the order of the searches, those of these sources first.
+    """
     before = load("contract")
     stored = [
         Count(**{**count, "kinds": tuple(count["kinds"])}) for count in (before.counts if before else ())
     ]
     sources = code(*RESTS_ON)
-    latest = {(count.search, count.seed): count for count in (*stored, *counts) if count.code == sources}
-    return [latest[key] for key in sorted(latest, key=lambda key: (list(SEARCHES).index(key[0]), key[1]))]
+    latest = {(count.search, count.code, count.seed): count for count in (*stored, *counts)}
+    found: list[Count] = []
+    for name in SEARCHES:
+        by_code = defaultdict[str, list[Count]](list)
+        for count in latest.values():
+            if count.search == name:
+                by_code[count.code].append(count)
+        found += by_code.pop(sources, [])
+        found += max(by_code.values(), key=lambda own: sum(count.trials for count in own), default=[])
+    return found
 
 
 def rows(counts: Iterable[Count]) -> list[Row]:
-    """Return a row for each search of which there are counts."""
+    """Return a row for each search and state of the sources of which there are counts."""
     every = list(counts)
-    by_search = {name: [count for count in every if count.search == name] for name in SEARCHES}
-    return [_row(SEARCHES[name], found) for name, found in by_search.items() if found]
+    kinds = dict.fromkeys((count.search, count.code) for count in every)
+    return [
+        _row(SEARCHES[name], [count for count in every if (count.search, count.code) == (name, sources)])
+        for name, sources in kinds
+    ]
 
 
 def _row(own: Wanted, counts: list[Count]) -> Row:
@@ -166,7 +189,8 @@ def _row(own: Wanted, counts: list[Count]) -> Row:
     more = f"; {discarded:,} in which somebody broke a rule before the ego did"
     bar = f"0 of {TRIALS:,}" if own.bar else ""
     met = not own.bar or (not found and trials >= TRIALS)
-    return Row(f"{own.says}, {trials:,} searched: {HAPPENS[own.target]}", told + more, bar, met)
+    when = "" if counts[0].code == code(*RESTS_ON) else ", of an earlier state of the rules and drivers"
+    return Row(f"{own.says}, {trials:,} searched{when}: {HAPPENS[own.target]}", told + more, bar, met)
 
 
 def measure() -> list[Row]:

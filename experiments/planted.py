@@ -72,7 +72,7 @@ HOLES: Final = {
         world(RING, LAWFUL, 60.0, car={"body": {"rectangle": {"length": 0.62, "width": 0.28}}}),
     ),
     "queue": Hole(QUEUE, "provoked", STANDS, world(ELBOW, LAWFUL, 120.0, rules={"crossing_degree": 1})),
-    "flips": Hole(FLIPS, "blocked", "rules", OBSTACLE | {"e-agents": [{"type": "free", "name": "free"}]}),
+    "flips": Hole(FLIPS, "blocked", "rules", OBSTACLE),
     "turns": Hole(TURNS, "blocked", "rules", WAITING),
 }  # fmt: skip
 

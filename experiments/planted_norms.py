@@ -121,14 +121,16 @@ CHANGES: Final = (
     Change(
         "shield/checks.py",
         "        return REASON.RETURN if bits & FLAG.LEFT != 0 else REASON.NOTHING\n",
-        f"        return REASON.RETURN if bits & FLAG.LEFT != 0 and shields.ego[b].hole < {FLIPS} else REASON.NOTHING\n",
+        f"        left = bits & FLAG.LEFT != 0 and shields.ego[b].hole < {FLIPS}\n"
+        "        return REASON.RETURN if left else REASON.NOTHING\n",
     ),
     Change(
         "shield/checks.py",
         "    if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:\n",
-        f"    if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0 and shields.ego[b].hole >= {FLIPS}:\n"
+        "    left = np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0\n"
+        f"    if left and shields.ego[b].hole >= {FLIPS}:\n"
         "        return REASON.NOTHING\n"
-        "    if np.int64(labels.bits[b, EGO]) & FLAG.LEFT != 0 and labels.at[b, EGO] < 0:\n",
+        "    if left:\n",
     ),
     Change(
         "agents/free.py",

@@ -35,6 +35,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Sequence
+from functools import cached_property
 from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, overload
 
 import numpy as np
@@ -111,6 +112,21 @@ class Table(np.ndarray[Any, Any]):
         """Begin without rows known."""
         self.known = {}
 
+    @cached_property
+    def plain(self) -> npt.NDArray[Any] | None:
+        """The memory of the table as an array that does not refer to it, None if it is the table's own.
+
+        What a table keeps must not keep the table: NumPy does not show the garbage collector what an array is a view
+        of, so that such a circle would never be let go.
+        """
+        root: npt.NDArray[Any] = self
+        while isinstance(root.base, np.ndarray):
+            root = root.base
+        if root is self or not root.flags.c_contiguous or not self.size:
+            return None
+        own, first = (array.__array_interface__["data"][0] for array in (self, root))
+        return np.ndarray(self.shape, self.dtype, buffer=root, offset=own - first, strides=self.strides)
+
     def __getitem__(self, place: Any) -> Any:
         """Return the row, the field or the part of the table at a place."""
         try:
@@ -140,34 +156,25 @@ class Table(np.ndarray[Any, Any]):
         cast(Any, super()).__setitem__(place, value)
 
     def _find(self, place: Any) -> Any:
-        plain = _plain(self)
-        found = super().__getitem__(place) if plain is None else plain[place]
-        if isinstance(place, str):
-            found = found.view(np.ndarray)
-        elif isinstance(found, np.void):
-            axes = cast(tuple[int, ...], place if isinstance(place, tuple) else (place,))
-            far = sum(int(number) * step for number, step in zip(axes, self.strides, strict=True))
-            found = self.KIND(self if plain is None else plain, far)
+        plain = self.plain
+        found: Any
+        if plain is not None and type(place) is int and plain.ndim == 1 and 0 <= place < len(plain):
+            found = self.KIND(plain, place * plain.strides[0])
         else:
-            found = found.view(type(self))
+            found = self._look_up(plain, place)
         if plain is not None and len(self.known) < MOST_KNOWN:
             self.known[place] = found
         return found
 
-
-def _plain(own: Table) -> npt.NDArray[Any] | None:
-    """Return a table's memory as an array that does not refer to the table, or None if the memory is the table's own.
-
-    What a table keeps must not keep the table: NumPy does not show the garbage collector what an array is a view of,
-    so that such a circle would never be let go.
-    """
-    root: npt.NDArray[Any] = own
-    while isinstance(root.base, np.ndarray):
-        root = root.base
-    if root is own or not root.flags.c_contiguous or not own.size:
-        return None
-    far = own.ctypes.data - root.ctypes.data
-    return np.ndarray(own.shape, own.dtype, buffer=root, offset=far, strides=own.strides)
+    def _look_up(self, plain: npt.NDArray[Any] | None, place: Any) -> Any:
+        found = super().__getitem__(place) if plain is None else plain[place]
+        if isinstance(place, str):
+            return found.view(np.ndarray)
+        if not isinstance(found, np.void):
+            return found.view(type(self))
+        axes = cast(tuple[int, ...], place if isinstance(place, tuple) else (place,))
+        far = sum(int(number) * step for number, step in zip(axes, self.strides, strict=True))
+        return self.KIND(self if plain is None else plain, far)
 
 
 def _revive(kind: Any, rows: npt.NDArray[Any]) -> Any:
