@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import product
-from typing import Any
+from typing import Any, Literal
 
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
@@ -26,7 +26,7 @@ LOSSES = (0.0, 0.05, 0.1)
 class Cell:
     """What came of the trials with a delay (ticks), noise (m) and loss (share of the commands).
 
-    Of `trials`, how many were `clean`, and their counted rounds in all.
+    Of `trials`, how many were `clean`, in how many an e-agent broke a rule, and their counted rounds in all.
     """
 
     delay: int
@@ -34,6 +34,7 @@ class Cell:
     loss: float
     trials: int
     clean: int
+    others_broke: int
     counted_rounds: int
 
 
@@ -61,6 +62,7 @@ def robustness(
     delays: Sequence[int] = DELAYS,
     noises: Sequence[float] = NOISES,
     losses: Sequence[float] = LOSSES,
+    cars: Literal["ego", "all"] = "ego",
     progress: Callable[[int, int], object] | None = None,
 ) -> Robustness:
     """Let a controller drive the same trials of `town` with each delay, noise and loss.
@@ -75,6 +77,8 @@ def robustness(
         Processes that share the trials.
     delays, noises, losses : sequences
         In ticks, metres and shares.
+    cars : str
+        Whose commands come late or get lost, and who sees noisy poses: the ego, or all cars.
     progress : callable, optional
         Is told after each trial how many have ended, of how many.
 
@@ -85,7 +89,7 @@ def robustness(
     """
     configuration = load_config(CONFIGURATION)
     kinds = [
-        Disturbances(command_delay=delay, position_noise=noise, command_loss=loss)
+        Disturbances(command_delay=delay, position_noise=noise, command_loss=loss, cars=cars)
         for loss, delay, noise in product(losses, delays, noises)
     ]
     whole = [replace(draw(configuration, SEED, trial), duration=SECONDS) for trial in range(trials)]
@@ -103,6 +107,10 @@ def robustness(
 
 
 def _cell(kind: Disturbances, scores: Sequence[Score]) -> Cell:
-    clean = sum(score.verdict is not None and score.verdict.clean for score in scores)
+    verdicts = [score.verdict for score in scores if score.verdict is not None]
+    clean = sum(verdict.clean for verdict in verdicts)
+    others = sum(verdict.assumption_broken for verdict in verdicts)
     rounds = sum(score.counted_rounds for score in scores)
-    return Cell(kind.command_delay, kind.position_noise, kind.command_loss, len(scores), clean, rounds)
+    return Cell(
+        kind.command_delay, kind.position_noise, kind.command_loss, len(scores), clean, others, rounds
+    )

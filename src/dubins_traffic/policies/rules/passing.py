@@ -120,7 +120,8 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     reach = vehicle.reach
     own = along(way, state.x[b, n], state.y[b, n])
     end, offset, _ = extent(b, n, way, own, traffic, vehicle, drivers.car[b, n].lane)
-    offset += BERTH + vehicle.half_width + vehicle.rounding
+    width = vehicle.half_width + vehicle.rounding
+    offset += BERTH + width
     line = stop_line(vehicle)
     until = end + SLIP + 2.0 * vehicle.half_length
     tight = scratch.tight[0]
@@ -156,12 +157,7 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
         passes = labels.bits[b, j] & FLAG.LEFT != 0 and not stands
         if j != n and key > own - (OVERTAKEN if passes else 0.5):
             before = key > own or left > vehicle.middle
-            wide = (
-                half_across(b, j, way.tx, way.ty, state, vehicle)
-                + vehicle.half_width
-                + vehicle.rounding
-                + 0.1
-            )
+            wide = half_across(b, j, way.tx, way.ty, state, vehicle) + width + 0.1
             # Before an obstacle all go first who are not blocked: who stands may set off, and come nearer.
             bars = who < -1 or abs(left - offset) < wide
             waits = stands and (who >= -1 or labels.bits[b, j] & FLAG.BLOCKED != 0)

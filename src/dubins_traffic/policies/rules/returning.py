@@ -65,7 +65,7 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
         stands = waits or abs(state.speed[b, j]) < SLOW
         if stands and own - length < key <= car.until:
             return speed
-        if stands and abs(key - own) < length:
+        if stands and abs(key - own) < (length + BERTH if waits else length):
             if goes_farther(key, vehicle, car):
                 return speed
             if waits:

@@ -161,30 +161,34 @@ def come_back(
     """Return the motion of a car that is left and returns between other cars; `Motion` tells whether it is safe.
 
     `motion` (m/s, rad/s) is the one it would have otherwise; `near` (count) cars are listed. It does not turn toward a
-    car that bars its way back, and goes straight to the right where there is room for that only.
+    car that bars its way back, and goes straight to the right where there is room for that only. Once it falls back
+    it does so to the end.
     """
     state, vehicle = traffic.state, traffic.drivers.vehicle[b]
     safe = motion.safe
     if safe and motion.speed == 0.0 and line.speed >= CREEPS:
         safe = leads_on(b, n, line, STEEP, near, -1, traffic)
     own = along(way, state.x[b, n], state.y[b, n])
-    far = own < last_return(vehicle) + NARROWLY
-    back = 0.0 if far else backs_off(own, line.left, vehicle)
-    if not (safe and line.speed >= CREEPS) and back <= SLANT:
-        # Near the disc straight to the right to the end, or a little back: it would come into the disc, still left.
-        left, on = line.left if far else 1.0, sqrt(1.0 - back * back)
-        line = Line(left, line.px * on + line.py * back, line.py * on - line.px * back, SLIDES)
-        if leads_on(b, n, line, SQUARE, near, -1, traffic):
-            speed, yaw_rate = steer(
-                state.c[b, n], state.s[b, n], left, line.px, line.py, 0.0, SLIDES, SQUARE, EXACT,
-                vehicle.yaw_most, 0.0, vehicle.period,
-            )  # fmt: skip
-            return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
-    if not (safe and line.speed >= CREEPS) and traffic.drivers.car[b, n].aside != 0.0:
+    if traffic.drivers.car[b, n].until == -INFINITE:
         retreat = fall_back(b, n, own, line, way, near, traffic)
         if retreat.safe:
             return retreat
-    return Motion(motion.speed, motion.yaw_rate, safe)
+    far = own < last_return(vehicle) + NARROWLY
+    back = 0.0 if far else backs_off(own, line.left, vehicle)
+    if safe and line.speed >= CREEPS:
+        return motion
+    if back <= SLANT:
+        # Near the disc straight to the right to the end, or a little back: it would come into the disc, still left.
+        left, on = line.left if far else 1.0, sqrt(1.0 - back * back)
+        right = Line(left, line.px * on + line.py * back, line.py * on - line.px * back, SLIDES)
+        if leads_on(b, n, right, SQUARE, near, -1, traffic):
+            speed, yaw_rate = steer(
+                state.c[b, n], state.s[b, n], left, right.px, right.py, 0.0, SLIDES, SQUARE, EXACT,
+                vehicle.yaw_most, 0.0, vehicle.period,
+            )  # fmt: skip
+            return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
+    retreat = fall_back(b, n, own, line, way, near, traffic)
+    return retreat if retreat.safe else Motion(motion.speed, motion.yaw_rate, safe)
 
 
 @jit_rare
@@ -207,8 +211,10 @@ def fall_back(
     if clear == 0.0:
         return Motion(0.0, 0.0, False)
     gear = -1.0 if vehicle.slowest < 0.0 else 1.0
+    # Not yet clear it goes to the left as steeply as it may: less steeply it might come nearer to who is behind it.
+    away = 1.0 if clear > line.left else clear - line.left
     speed, yaw_rate = steer(
-        gear * state.c[b, n], gear * state.s[b, n], clear - line.left, -line.px, -line.py, 0.0, SLIDES, SLANT, ALIGNED,
+        gear * state.c[b, n], gear * state.s[b, n], away, -line.px, -line.py, 0.0, SLIDES, SLANT, ALIGNED,
         vehicle.yaw_most, 0.0, vehicle.period,
     )  # fmt: skip
     speed = max(gear * speed, vehicle.slowest)
