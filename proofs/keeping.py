@@ -32,6 +32,15 @@ def _same(value: Any) -> Of:
     return Of(lambda _index: value)
 
 
+class _Until:
+    """Where a car returns: it may fall back already, or not."""
+
+    __hash__ = None
+
+    def __eq__(self, _other: object) -> Any:
+        return _either()
+
+
 class Drive:
     """A car that the law is about to drive, and what it has found to be safe so far."""
 
@@ -45,7 +54,7 @@ class Drive:
         self.disc = disc
         self.premises = [vehicle.tightest.term >= 0, *([] if disc else [vehicle.half_length.term > 0])]
         pose = {name: _same(Real(name)) for name in "xycs"}
-        car = SimpleNamespace(aside=Real("aside"))
+        car = SimpleNamespace(aside=Real("aside"), until=_Until())
         self.traffic = SimpleNamespace(
             state=SimpleNamespace(**pose), labels=SimpleNamespace(bits=_same(Flags("bits"))),
             drivers=SimpleNamespace(vehicle=[vehicle], car=_same(car)), scratch=SimpleNamespace(near=[EGO]),

@@ -143,7 +143,7 @@ FLAWS: Final = (
     Flaw("standing", referee_kernel, "far = roads.half_width[net] + GRAIN", "far = roads.half_width[net] - GRAIN"),
     Flaw("driven", steering, "    if not safe:\n        speed = 0", "    if not safe and near > 1:\n        speed = 0"),
     Flaw("driven", steering, "return on and (not outside", "return (not outside"),
-    Flaw("driven", steering, "return retreat", "return Motion(retreat.speed, 0.0, retreat.safe)"),
+    Flaw("driven", steering, "return retreat if", "return Motion(retreat.speed, 0.0, True) if"),
     Flaw("called", breaches, "FIRST_AND_CLEAR == FIRST_AND_CLEAR", "FIRST_AND_CLEAR != 0"),
 )  # fmt: skip
 

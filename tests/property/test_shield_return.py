@@ -29,7 +29,7 @@ from tests.unit.test_law import TURN, W, broken, car, on_grid, turned
 
 Chooses = Callable[[int, State], tuple[float, float]]
 START = turned(1.6, -W)
-FASTEST, PERIOD = 0.7, 1.0 / 30.0
+FASTEST, PERIOD, CLOSE = 0.7, 1.0 / 30.0, 0.36
 
 
 class Adversary:
@@ -56,10 +56,11 @@ def along(state: State, n: int) -> float:
 def keeps_beside(n: int, state: State, slowest: float = 0.0) -> tuple[float, float]:
     """Move up beside the ego, a little ahead of it, and stop when it stops; this breaks neither E1 nor E2.
 
-    Or back up with it, too, however far: `slowest` is negative then, m/s.
+    Or back up with it, too, however far, but not up to it: `slowest` is negative then, m/s.
     """
     ahead = along(state, EGO) + 0.1 - along(state, n)
-    return min(max(ahead / PERIOD, slowest), FASTEST), 0.0
+    near = math.hypot(*(float(own[0, EGO] - own[0, n]) for own in (state.x, state.y))) < CLOSE
+    return min(max(ahead / PERIOD, 0.0 if near else slowest), FASTEST), 0.0
 
 
 def hunts(n: int, state: State) -> tuple[float, float]:
