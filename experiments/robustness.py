@@ -18,7 +18,7 @@ from benchmarks.table import Row, show
 from dubins_traffic.checkup.robustness import DELAYS, LOSSES, NOISES, robustness
 from dubins_traffic.errors import InputError
 
-TRIALS: Final = 10
+TRIALS: Final = 5
 
 
 class Who(NamedTuple):

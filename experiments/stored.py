@@ -106,6 +106,12 @@ CLAIMS: Mapping[str, Claim] = {
         "shield.md#what-it-does-not-promise",
         "some minutes",
     ),
+    "robustness": Claim(
+        "with commands that come up to three ticks late or get lost and poses that are noisy by up to 20 mm, how many "
+        "trials of `rules`, of `lanes+shield` and of `lawful` cars stay clean",
+        "attach.md",
+        "some minutes",
+    ),
     "outside": Claim(
         "cars of worlds outside, over ROS 1 and ROS 2, with late and lost commands and noisy poses, are driven "
         "without a breach, or the verdict says that it can't be told; a delay that is not declared is said",
