@@ -136,12 +136,8 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
         return
     if stands_beside(b, own, back, offset, way, obstacles, vehicle):
         return
-    crosses_over = not within_lane(offset, vehicle)
-    if (
-        n != EGO
-        and crosses_over
-        and ego_is_beside(b, own, back, way, traffic, drivers.car[b, n].lane, vehicle)
-    ):
+    crosses_over = n != EGO and not within_lane(offset, vehicle)
+    if crosses_over and ego_is_beside(b, own, back, way, traffic, car.lane, vehicle):
         return
     time = passing_time(own, until, tight, vehicle)
     if time > vehicle.left_time:
@@ -158,8 +154,8 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
         if j != n and key > own - (OVERTAKEN if passes else 0.5):
             before = key > own or left > vehicle.middle
             wide = half_across(b, j, way.tx, way.ty, state, vehicle) + width + 0.1
-            # Before an obstacle all go first who are not blocked: who stands may set off, and come nearer.
-            bars = who < -1 or abs(left - offset) < wide
+            # Before an obstacle all go first in the other lane who are not blocked: who stands may come nearer.
+            bars = (who < -1 and left > vehicle.middle) or abs(left - offset) < wide
             waits = stands and (who >= -1 or labels.bits[b, j] & FLAG.BLOCKED != 0)
             if before and bars and key < back + (0.5 if waits else comes):
                 return
