@@ -172,15 +172,13 @@ def together(counts: Iterable[Count]) -> list[Count]:
 
 def rows(counts: Iterable[Count]) -> list[Row]:
     """Return a row for each search and state of the sources of which there are counts."""
-    every = list(counts)
-    kinds = dict.fromkeys((count.search, count.code) for count in every)
-    return [
-        _row(SEARCHES[name], [count for count in every if (count.search, count.code) == (name, sources)])
-        for name, sources in kinds
-    ]
+    now, groups = code(*RESTS_ON), defaultdict[tuple[str, str], list[Count]](list)
+    for count in counts:
+        groups[count.search, count.code].append(count)
+    return [_row(SEARCHES[name], own, earlier=sources != now) for (name, sources), own in groups.items()]
 
 
-def _row(own: Wanted, counts: list[Count]) -> Row:
+def _row(own: Wanted, counts: list[Count], *, earlier: bool) -> Row:
     trials, found, discarded = (
         sum(getattr(count, name) for count in counts) for name in ("trials", "found", "discarded")
     )
@@ -189,7 +187,7 @@ def _row(own: Wanted, counts: list[Count]) -> Row:
     more = f"; {discarded:,} in which somebody broke a rule before the ego did"
     bar = f"0 of {TRIALS:,}" if own.bar else ""
     met = not own.bar or (not found and trials >= TRIALS)
-    when = "" if counts[0].code == code(*RESTS_ON) else ", of an earlier state of the rules and drivers"
+    when = ", of an earlier state of the rules and drivers" if earlier else ""
     return Row(f"{own.says}, {trials:,} searched{when}: {HAPPENS[own.target]}", told + more, bar, met)
 
 
