@@ -87,17 +87,30 @@ def test_one_that_comes_while_a_dropped_one_is_heard_is_not_dropped(
 
     press, press_soon, pressed = signals._press, signals._press_soon, threading.Event()
 
-    def press_and_tell() -> None:
-        press()
+    def press_and_tell(number: int) -> None:
+        press(number)
         pressed.set()
 
-    def go_on_late() -> None:
-        press_soon()
+    def go_on_late(number: int) -> None:
+        press_soon(number)
         pressed.wait()
 
     monkeypatch.setattr(signals, "_press", press_and_tell)
     monkeypatch.setattr(signals, "_press_soon", go_on_late)
     test_one_that_python_drops_is_heard_all_the_same(tmp_path, monkeypatch, capsys)
+
+
+def test_a_sigterm_that_python_drops_is_heard_where_ctrl_c_is_ignored(tmp_path: Path) -> None:
+    """As in a program that a script has begun in the background."""
+    (tmp_path / "mine.py").write_text(DROPPED.replace("SIGINT", "SIGTERM"))
+    words = [sys.executable, "-m", "dubins_traffic.cli", "run", "demo", "--controller", "mine.py:Ringing"]
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert (done.returncode, done.stdout) == (1, "")
+    assert done.stderr.startswith("dubins-traffic: interrupted after 0 of ")
 
 
 IN_A_TEXT = """

@@ -19,7 +19,7 @@ _heard: dict[int, Any] = {}
 
 @contextmanager
 def heard_again() -> Generator[None]:
-    """Let each Ctrl-C that Python drops in the body come again, soon, without a word about it.
+    """Let each Ctrl-C or SIGTERM that Python drops in the body come again, soon, without a word about it.
 
     Python drops whatever is raised in a destructor or in a callback of its imports. The program would go on as if
     nothing had been pressed, behind a traceback that nobody can do anything about.
@@ -30,10 +30,12 @@ def heard_again() -> Generator[None]:
         if not issubclass(dropped.exc_type, KeyboardInterrupt):
             before(dropped)
             return
+        number = signal.SIGINT
         while True:
             try:
+                number = next(iter(_heard), number)
                 _as_if_unheard()
-                _press_soon()
+                _press_soon(number)
             except KeyboardInterrupt:
                 continue  # it came in here: Python would drop it for good
             return
@@ -75,12 +77,12 @@ def _as_if_unheard() -> None:
             signal.signal(*_heard.popitem())
 
 
-def _press_soon() -> None:
-    threading.Thread(target=_press, daemon=True).start()
+def _press_soon(number: int) -> None:
+    threading.Thread(target=_press, args=(number,), daemon=True).start()
 
 
-def _press() -> None:
+def _press(number: int) -> None:
     sleep(SOON)
     main = threading.main_thread().ident
     if main is not None:
-        signal.pthread_kill(main, signal.SIGINT)
+        signal.pthread_kill(main, number)
