@@ -43,7 +43,7 @@ class Meeting:
         self.car = SimpleNamespace(
             half_length=0.0 if disc else Real("half_length"), half_width=0.0 if disc else Real("half_width"),
             rounding=Real("reach") if disc else 0.0, reach=Real("reach"), period=Real("period"),
-            slowest=Real("slowest"), fastest=Real("fastest"), yaw_most=Real("yaw_most"), late=0.0, unsure=0.0,
+            slowest=Real("slowest"), fastest=Real("fastest"), yaw_most=Real("yaw_most"), late=0.0, unsure=0.0, blur=0.0,
         )  # fmt: skip
         self.command: Any = Command(Real("speed"), Real("yaw_rate"))  # pyright: ignore[reportArgumentType]
         self.poses = [tuple(Real(f"{name}{k}") for name in "xycs") for k in range(QUARTERS)]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from experiments.disturbed import CONTROLLERS, Drive, driven, provoked
+from experiments.outside import SEED, TRIAL
 
 from dubins_traffic.cars.state import Command, Observation, Pose, Propositions, Twist
 from dubins_traffic.controllers.rules import Rules
@@ -28,6 +29,7 @@ from dubins_traffic.runs.sources import load_record
 from dubins_traffic.verification.resimulate import trial_difference
 from tests.contract_provoking import PROVOKING
 from tests.contract_scenes import trial
+from tests.ros import configuration
 
 
 def problem(**disturbances: float) -> Problem:
@@ -61,6 +63,30 @@ def test_a_delay_that_nobody_counts_in_breaks_rules() -> None:
     verdict = run_trial(late, Untold(), sketch=False).score.verdict
     assert verdict is not None
     assert any(one.car == "ego" for one in verdict.violations)
+
+
+LOSSES = [("rules", 0), ("rules", 13), ("rules", 18)] + [
+    ("lanes+shield", number) for number in (1, 9, 10, 11, 15, 16, 17)
+]
+"""Trials in which a lost command broke 3.stop as long as nobody reckoned with any."""
+
+
+@pytest.mark.parametrize(("controller", "number"), LOSSES)
+def test_one_lost_command_breaks_no_rule(controller: str, number: int, tmp_path: Path) -> None:
+    instance = draw(load_config(configuration(tmp_path, **TRIAL)), SEED + number, 0)
+    lossy = replace(instance, disturbances=Disturbances(command_delay=3, command_loss=0.1))
+    verdict = run_trial(lossy, controller, sketch=False).score.verdict
+    assert verdict is not None
+    assert verdict.own_violations == ()
+    assert verdict.rounds >= 1
+
+
+def test_loss_is_told_and_adds_the_way_of_a_tick() -> None:
+    noisy, lossy = problem(position_noise=0.005), problem(position_noise=0.005, command_loss=0.01)
+    assert lossy.blur == noisy.blur == noisy.unsure
+    assert lossy.unsure == pytest.approx(noisy.unsure + lossy.car.bounds.speed / lossy.rate)
+    assert problem_from_document(problem_to_document(lossy)).command_loss == 0.01
+    assert "command_loss" not in problem_to_document(noisy)["disturbances"]
 
 
 def test_the_ego_is_seen_where_it_will_be() -> None:

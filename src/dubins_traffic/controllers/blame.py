@@ -44,7 +44,7 @@ def error_text(error: BaseException, tick: int | None = None) -> str:
     """
     when = "" if tick is None else f" at tick {tick}"
     lines = [] if isinstance(error, DubinsTrafficError) else list(_own_lines(_frames(error)))[-LINES:]
-    return f"{_named(error)}{when}{_lines_text(lines)}"
+    return f"{_named(error)}{when}" + (f" ({' > '.join(lines)})" if lines else "")
 
 
 def value_text(value: object, limit: int = LONGEST) -> str:
@@ -56,10 +56,6 @@ def show(error: BaseException) -> None:
     """Print the whole traceback of an error that a controller raised, if `DEBUG` asks for it."""
     if os.environ.get(DEBUG):
         traceback.print_exception(error)
-
-
-def _lines_text(lines: list[str]) -> str:
-    return f" ({' > '.join(lines)})" if lines else ""
 
 
 def _named(error: BaseException) -> str:

@@ -188,15 +188,13 @@ class Lanes:
             along = pose.c * tx + pose.s * ty
             cost = length - s + (0.0 if along > 0.3 or out else turning)
             cost += DETOUR if lane in self._blocked else 0.0
-            if not out and length - s < self._longest_turn(lane):
+            turns = (self._maker.turn(lane, other) for other in network.successors(lane))
+            if not out and length - s < max(turn.before for turn in turns):
                 cost += 20.0
             if abs(left + w) > 2.5 * w or s < -self._problem.intersection_radius:
                 cost += 50.0
             entries.append((lane, min(s, length), left + w, cost))
         return entries
-
-    def _longest_turn(self, lane: int) -> float:
-        return max(self._maker.turn(lane, other).before for other in self._network.successors(lane))
 
     def _cost(self, lane: int, other: int) -> float:
         """Return the cost of a turn, metres, with that of places found blocked."""

@@ -504,7 +504,8 @@ class _Builder:
 
     def _meetable(self, memory: tuple[bool, ...], moves: Moves) -> bool:
         if not self._table.clocks:
-            return any(self._emptiness.meetable(memory, _numbers(move)) for move in moves)
+            numbered = (frozenset(atom >> 2 for atom in move) for move in moves)
+            return any(self._emptiness.meetable(memory, numbers) for numbers in numbered)
         if any(self._emptiness.meetable(memory, self._replaced(move, False)) for move in moves):
             return True
         if any(self._emptiness.meetable(memory, self._replaced(move, True)) for move in moves):
@@ -538,10 +539,6 @@ class _Builder:
                 return parts[1]
         found = self._bounds[key] = self._table.node(changed)
         return found
-
-
-def _numbers(move: frozenset[Atom]) -> frozenset[int]:
-    return frozenset(atom >> 2 for atom in move)
 
 
 def _reduced(table: Table, letter: Ints, target: Ints, reset: Ints, verdict: Ints) -> Automaton:

@@ -40,8 +40,8 @@ class Mover(Protocol):
         What is farther away than this is not looked at: no tick leads there, metres.
     late : float
         Ticks by which its commands take effect late: others move meanwhile.
-    unsure : float
-        How far any point of a car may be from where it is seen, metres.
+    unsure, blur : float
+        How far any point of it may be from where its driver expects it, and of a car from where it is seen, metres.
     """
 
     half_length: float
@@ -56,6 +56,7 @@ class Mover(Protocol):
     near: float
     late: float
     unsure: float
+    blur: float
 
 
 @jit_inline
@@ -79,7 +80,7 @@ def travel_of(car: Mover) -> float:
     travel = stride_of(car)
     if car.half_length > 0.0:
         travel += car.yaw_most * car.reach * car.period
-    return travel * (1.0 + car.late) + 2.0 * car.unsure
+    return travel * (1.0 + car.late) + (car.unsure + car.blur)
 
 
 @jit_rare

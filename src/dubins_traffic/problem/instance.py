@@ -60,8 +60,8 @@ class Problem(Pictured):
     `goals` are lattice points (x, y) of intersections; `goal_vertices` their numbers in `network.intersections`.
     `rules` holds the parameters of docs/rules.md by name, empty where the rules are not to be judged; `formulas` the
     texts of what is judged beside the task, by name. Neither can be changed. The ego's commands
-    take effect `command_delay` ticks late, and `pose_noise` holds the standard deviations of the poses that its driver
-    sees (m along each axis, rad): the noise is normal, cut at three of them (`Disturbances`).
+    take effect `command_delay` ticks late, `command_loss` is the share of them that is lost, and `pose_noise` holds the
+    standard deviations of the poses that its driver sees (m, rad): normal, cut at three of them (`Disturbances`).
     """
 
     network: RoadNetwork
@@ -77,6 +77,7 @@ class Problem(Pictured):
     formulas: Mapping[str, str] = field(default_factory=dict[str, str])
     command_delay: int = 0
     pose_noise: tuple[float, float] = (0.0, 0.0)
+    command_loss: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "rules", read_only(self.rules))
@@ -116,17 +117,25 @@ class Problem(Pictured):
         return sqrt(2.0) * (CUT * self.pose_noise[0])
 
     @property
-    def unsure(self) -> float:
+    def blur(self) -> float:
         """How far any point of a car may be from where it is seen, metres."""
         return self.off_centre + self.car.body.reach * (CUT * self.pose_noise[1])
 
+    @property
+    def unsure(self) -> float:
+        """How far any point of a driver's own car may be from where it expects it, metres.
+
+        Where commands get lost it includes the way of one tick. More than one in a row are not reckoned with.
+        """
+        return self.blur + (self.car.bounds.speed * self.period if self.command_loss else 0.0)
+
 
 def _disturbed(problem: Problem, by: Disturbances) -> Problem:
-    """Return a problem with the delay and the noise of disturbances: itself if it has them."""
-    noise = (by.position_noise, by.heading_noise)
-    if (problem.command_delay, problem.pose_noise) == (by.command_delay, noise):
+    """Return a problem with the delay, noise and loss of disturbances: itself if it has them."""
+    told = (by.command_delay, (by.position_noise, by.heading_noise), by.command_loss)
+    if (problem.command_delay, problem.pose_noise, problem.command_loss) == told:
         return problem
-    return replace(problem, command_delay=by.command_delay, pose_noise=noise)
+    return replace(problem, command_delay=told[0], pose_noise=told[1], command_loss=told[2])
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,7 @@ SECRET = ("starts", "duration", "seed", "trial", "end_on_collision", "simulator"
 def problem_to_document(problem: Problem) -> dict[str, Any]:
     """Return the document of `problem`: that of an instance, version 1, without the fields in `SECRET`.
 
-    Of the disturbances it gives delay and noise, if there are any. Of the e-agents it gives the names alone; their type
+    Of the disturbances it gives delay, noise and loss, if there are any. Of the e-agents it gives the names; their type
     is always given as `remote`.
     """
     cars = 1 + len(problem.e_agents)
@@ -27,6 +27,7 @@ def problem_to_document(problem: Problem) -> dict[str, Any]:
     instance = Instance(problem, (Pose(0.0, 0.0, 1.0, 0.0),) * cars, 1.0, agents, seed=0, trial=0)
     (position, heading), delay = problem.pose_noise, problem.command_delay
     known = {"position_noise": position, "heading_noise": heading, "command_delay": delay}
+    known |= {"command_loss": problem.command_loss} if problem.command_loss else {}
     whole = instance_to_document(instance)
     document = {key: value for key, value in whole.items() if key not in (*SECRET, "disturbances")}
     return document | {"disturbances": known} if any(known.values()) else document

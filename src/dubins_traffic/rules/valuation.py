@@ -15,7 +15,7 @@ from dubins_traffic.rules.judged import JudgedInstance
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG, NAMES
-from dubins_traffic.rules.referee import Breach, Referee
+from dubins_traffic.rules.referee import Referee
 from dubins_traffic.rules.visits import visited_place, visits_in
 from dubins_traffic.rules.vocabulary import (
     AT,
@@ -167,7 +167,8 @@ class Valuation:
         over = self._labeller.forfeits[0] == self._rules.tickets + 1
         scene.renewed[row] = over & (self._labeller.tickets[0] == tick)
         for breach in breaches:
-            if _of_e1(breach) and self._exceptions.exceeded(breach):
+            of_e1 = breach.car != EGO and not breach.rule.startswith("E")
+            if of_e1 and self._exceptions.exceeded(breach):
                 scene.excess[row, breach.car] = True
 
     def _value(self, scene: _Scene, wanted: Proposition) -> Mask:
@@ -203,7 +204,3 @@ class Valuation:
         if word == "enter":
             return crosses[:, car] & (scene.bits[:, car] & FLAG.ENTERED != 0)
         return crosses[:, car]
-
-
-def _of_e1(breach: Breach) -> bool:
-    return breach.car != EGO and not breach.rule.startswith("E")

@@ -140,7 +140,8 @@ def plan(
         If an argument or the source is wrong; nothing has been written then.
     """
     found = load_runnable(source, rnd=rnd, seed=seed or 0)
-    named = _default_controller(found) if controller is None else controller
+    recorded = found.controller if isinstance(found, Record) else None
+    named = (recorded or DEFAULT_CONTROLLER) if controller is None else controller
     controller = controllers.dressed(named, shield=shield, sandbox=sandbox)
     controllers.load(controller)
     scores.columns(further := scores.with_share(metrics, [controller]))
@@ -180,11 +181,6 @@ def load_runnable(
         expected = "a trials configuration, a problem instance or a record"
         raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
     return found
-
-
-def _default_controller(found: Configuration | Instance | Record) -> str:
-    """Return the controller that drives by default: that of a record, otherwise `DEFAULT_CONTROLLER`."""
-    return (found.controller if isinstance(found, Record) else None) or DEFAULT_CONTROLLER
 
 
 def _instances(jobs: Sequence[Job], seed: int) -> Callable[[int], Instance]:

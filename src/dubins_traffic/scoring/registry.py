@@ -34,7 +34,10 @@ _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 
 def names() -> Mapping[str, str]:
     """Return the metrics of this and other packages: name to one line of description."""
-    return {name: _line(maker) for name, maker in _registered().items()}
+    return {
+        name: (maker.__doc__ or "").strip().partition("\n")[0].rstrip(".")
+        for name, maker in _registered().items()
+    }
 
 
 def load(spec: MetricSpec) -> Maker:
@@ -129,8 +132,3 @@ def _maker(spec: MetricSpec) -> Maker:
 @cache
 def _registered() -> Mapping[str, Maker]:
     return outside.of_packages(GROUP)
-
-
-def _line(maker: Maker) -> str:
-    """Return the first line of a class's docstring."""
-    return (maker.__doc__ or "").strip().partition("\n")[0].rstrip(".")

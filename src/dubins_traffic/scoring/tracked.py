@@ -39,7 +39,7 @@ class Tracked:
         """Start without a frame."""
         tracked = instance.simulator in OUTSIDE and bool(instance.problem.rules)
         self._three = [_Judged(instance, by) for by in (MEASURED, FOR, AGAINST) if tracked]
-        self._tolerance = instance.problem.unsure
+        self._tolerance = instance.problem.blur
 
     def frames(self, frames: Frames) -> None:
         """Take a block of frames."""
@@ -123,7 +123,7 @@ def moved(instance: Instance, by: float) -> Instance:
     """
     problem = instance.problem
     rules = RuleParameters.from_mapping(problem.rules)
-    point = by * problem.unsure
+    point = by * problem.blur
     usual = {"approach_distance": rules.approach_distance, "queue_distance": rules.queue_distance}
     usual["turn_back"] = rules.turn_back
     near = {name: max(value - 2.0 * point, LEAST * value) for name, value in usual.items()}

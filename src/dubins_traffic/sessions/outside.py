@@ -11,7 +11,7 @@ from dubins_traffic.problem.instance import OUTSIDE, Instance
 from dubins_traffic.runs.plan import check_simulator
 from dubins_traffic.sessions.plan import Pace, SessionPlan, moved_by
 from dubins_traffic.transports.external import ExternalWorld, Wire
-from dubins_traffic.transports.tracked import Measured
+from dubins_traffic.transports.tracked import LOSS, Measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,6 +29,8 @@ class Outside:
     delay, noise : float, optional
         Of such a world: how late commands take effect, seconds, and how far poses are off at most, metres; by default
         both are measured before the first trial.
+    loss : float, optional
+        Of such a world: the share of commands that may get lost; cars that reckon with any keep a larger margin.
     """
 
     world: str
@@ -36,6 +38,7 @@ class Outside:
     poses: str | None
     delay: float | None
     noise: float | None
+    loss: float | None
 
     def __bool__(self) -> bool:
         """Tell whether the cars are in a world outside."""
@@ -46,7 +49,8 @@ class Outside:
 
         clock : whether `/clock` is published. elsewhere : whether another process is the maestro.
         """
-        for option, value in (("--poses", self.poses), ("--delay", self.delay), ("--noise", self.noise)):
+        own = {"--poses": self.poses, "--delay": self.delay, "--noise": self.noise, "--loss": self.loss}
+        for option, value in own.items():
             if value is not None and not self:
                 expected = f"--simulator {self.world}"
                 raise InputError("is of another world", file=option, value=value, expected=expected)
@@ -87,7 +91,9 @@ class Outside:
             problem, is_first = instance.problem, not known
             if is_first:
                 known.append(world.measure(instance))
-            declared = known[0].disturbances(problem, self.delay, self.noise)
+            declared = known[0].disturbances(
+                problem, self.delay, self.noise, LOSS if self.loss is None else self.loss
+            )
             if is_first:
                 plan.say(known[0].told(problem, declared))
             return replace(instance, disturbances=declared)

@@ -128,6 +128,15 @@ def _outside(world: str) -> tuple[Option, ...]:
             low=0.0,
             shown="measured",
         ),
+        Option(
+            "--loss",
+            float,
+            "Of that world: the share of commands that may get lost; with 0 cars keep less of a margin.",
+            metavar="P",
+            low=0.0,
+            high=1.0,
+            shown="0.05",
+        ),
     )
 
 

@@ -31,6 +31,7 @@ def run_over_ros1(
     poses: str | None = None,
     delay: float | None = None,
     noise: float | None = None,
+    loss: float | None = None,
 ) -> Iterator[Result]:
     """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
@@ -51,6 +52,8 @@ def run_over_ros1(
     delay, noise : float, optional
         Of such a world: how late commands take effect, seconds, and how far poses are off at most, metres; by default
         both are measured before the first trial.
+    loss : float, optional
+        Of such a world: the share of commands that may get lost, by default `transports.tracked.LOSS`.
 
     Raises
     ------
@@ -61,7 +64,7 @@ def run_over_ros1(
     InputError
         If an instance can't be drawn.
     """
-    outside = Outside(WORLD, simulator, poses, delay, noise)
+    outside = Outside(WORLD, simulator, poses, delay, noise, loss)
     session_plan = outside.planned(session_plan, pace, clock=clock, elsewhere=elsewhere)
     maestro = Maestro() if session_plan.controller is None and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None

@@ -46,6 +46,7 @@ def run_over_ros2(
     poses: str | None = None,
     delay: float | None = None,
     noise: float | None = None,
+    loss: float | None = None,
 ) -> Iterator[Result]:
     """Run the trials of `session_plan` and yield their results; leave nothing behind however it ends.
 
@@ -59,7 +60,7 @@ def run_over_ros2(
         Whether another process is the maestro: it tells problems, and starts and ends trials.
     clock : bool
         Whether `/clock` is published, and messages are stamped with simulated time.
-    simulator, poses, delay, noise : optional
+    simulator, poses, delay, noise, loss : optional
         What moves the cars, as `sessions.outside.Outside` has it; ``ros2-world``: they are somewhere in the domain, in
         real time.
 
@@ -72,7 +73,7 @@ def run_over_ros2(
     InputError
         If ``ROS_DOMAIN_ID`` is no domain, or an instance can't be drawn.
     """
-    outside = Outside(WORLD, simulator, poses, delay, noise)
+    outside = Outside(WORLD, simulator, poses, delay, noise, loss)
     session_plan = outside.planned(session_plan, pace, clock=clock, elsewhere=elsewhere)
     maestro = Maestro() if session_plan.controller is None and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None

@@ -22,6 +22,8 @@ LATEST: Final = 0.5
 """Delays are looked for up to this, seconds."""
 STEP = 0.001
 """Resolution of delays, seconds."""
+LOSS = 0.05
+"""Share of commands that may get lost in a world outside, where nobody says it: so short a time does not show it."""
 WATCHED = 300
 """Ticks of motion after which it is looked whether commands take effect as late as is declared."""
 LAGS = 20
@@ -54,7 +56,7 @@ class Measured:
     interval: float
 
     def disturbances(
-        self, problem: Problem, delay: float | None = None, noise: float | None = None
+        self, problem: Problem, delay: float | None = None, noise: float | None = None, loss: float = LOSS
     ) -> Disturbances:
         """Return them as what a problem declares; `delay` (s) and `noise` (m) replace what was measured.
 
@@ -65,8 +67,9 @@ class Measured:
         ticks = 1 + math.ceil(((late or 0.0) + self.interval) * problem.rate - 1e-9)
         position = self.position if noise is None else noise
         return Disturbances(
-            command_delay=ticks, position_noise=position / CUT, heading_noise=self.heading / CUT, cars="all"
-        )
+            command_delay=ticks, position_noise=position / CUT, heading_noise=self.heading / CUT,
+            command_loss=loss, cars="all",
+        )  # fmt: skip
 
     def told(self, problem: Problem, declared: Disturbances) -> str:
         """Return a line for people: what was found, and how finely stops can be judged."""

@@ -190,7 +190,9 @@ class Vehicle:
     late: float
     """Ticks by which commands take effect late."""
     unsure: float
-    """How far any point of a car may be from where it is seen, metres."""
+    """How far any point of the car may be from where its driver expects it, metres."""
+    blur: float
+    """How far any point of another may be from where it is seen, metres."""
     sight: float
     """What is farther away than this does not matter to a car's next tick, metres."""
     forfeit: float
@@ -321,7 +323,7 @@ def vehicles_of(problems: Sequence[Problem], disturbed: Sequence[bool] = ()) -> 
     least = np.array([least_speed(problems[k]) for k in first])
     rows["dawdle"] = np.maximum(DAWDLE, least)[alike]
     for own, problem in compress(zip(rows, problems, strict=True), disturbed):
-        own.late, own.unsure = problem.command_delay, problem.unsure
+        own.late, own.unsure, own.blur = problem.command_delay, problem.unsure, problem.blur
         own.over -= own.unsure
         own.near = near_of(problem.car, problem.period * (1.0 + own.late)) + 2.0 * own.unsure
     return rows
