@@ -396,7 +396,7 @@ def test_evaluating_needs_no_extra(tmp_path: Path) -> None:
     assert len(list(tmp_path.glob("evaluations/practice-*/results.jsonl"))) == 1
 
 
-@pytest.mark.parametrize("name", ["python", "cpp", "competition"])
+@pytest.mark.parametrize("name", ["python", "cpp", "ros2", "competition"])
 @pytest.mark.path
 def test_templates_are_whole_and_spoil_nothing(tmp_path: Path, name: str) -> None:
     paths = write_template(name, tmp_path / "new")

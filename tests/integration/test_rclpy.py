@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import signal
 import subprocess
@@ -18,6 +19,9 @@ import pytest
 pytest.importorskip("cyclonedds")
 
 import dubins_traffic as dt
+from dubins_traffic.competition.templates import write_template
+from dubins_traffic.kernels.trig import advance
+from dubins_traffic.problem.document import instance_to_document
 from dubins_traffic.transports.ros2 import messages as m
 from tests.beside import in_domain
 from tests.ports import kept_domain
@@ -27,7 +31,6 @@ pytestmark = pytest.mark.tools
 
 ROOT = Path(__file__).resolve().parents[2]
 COMMAND = str(Path(sys.executable).with_name("dubins-traffic"))
-NODE = str(ROOT / "examples" / "ros2" / "node.py")
 VERSIONS = ("jazzy", "kilted")
 TRIALS = os.environ.get("DUBINS_TRAFFIC_TRIALS_ROS2", "3")
 PATIENCE = 900
@@ -42,6 +45,18 @@ def config(tmp_path: Path) -> str:
     document = dt.load_config("demo").to_document() | {"duration_bounds": [4, 4]}
     (tmp_path / "short.json").write_text(json.dumps(document))
     return str(tmp_path / "short.json")
+
+
+@pytest.fixture
+def nodes(tmp_path: Path) -> Path:
+    """The package of nodes that is shipped to begin from."""
+    write_template("ros2", tmp_path / "nodes")
+    return tmp_path / "nodes"
+
+
+@pytest.fixture
+def node_file(nodes: Path) -> str:
+    return str(nodes / "controller.py")
 
 
 def ends(process: subprocess.Popen[str]) -> list[str]:
@@ -72,12 +87,12 @@ def test_types_have_the_hashes_of_ros_2(version: str) -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_node_drives_trial_after_trial(version: str, config: str, tmp_path: Path) -> None:
+def test_a_node_drives_trial_after_trial(version: str, config: str, node_file: str, tmp_path: Path) -> None:
     domain, python = kept_domain(), interpreter_with(version)
     arguments = session(
         config, "--lockstep", "--deadline", "60", "--trials", TRIALS, "--records", str(tmp_path / "out")
     )
-    with in_domain(domain, *arguments) as run, in_domain(domain, python, NODE) as node:
+    with in_domain(domain, *arguments) as run, in_domain(domain, python, node_file) as node:
         assert ends(run) == ["duration"] * int(TRIALS)
         ended_by_ctrl_c(node)
     driven = {float(dt.load_record(path).frames.x[-1, 0]) for path in (tmp_path / "out").glob("*.mcap")}
@@ -103,7 +118,7 @@ def test_a_session_is_seen_as_a_node(version: str) -> None:
     assert not [name for name, _ in seen["services"] if "maestro" in name]
 
 
-def test_two_sessions_in_two_domains(tmp_path: Path) -> None:
+def test_two_sessions_in_two_domains(node_file: str, tmp_path: Path) -> None:
     """With the default settings of both versions, in real time: they don't hear each other."""
     documents: dict[str, Any] = {}
     for version, seconds in zip(VERSIONS, (4, 6), strict=True):
@@ -113,8 +128,8 @@ def test_two_sessions_in_two_domains(tmp_path: Path) -> None:
     with (
         in_domain(first, *session(str(tmp_path / "jazzy.json"), "--trials", "2")) as one,
         in_domain(second, *session(str(tmp_path / "kilted.json"), "--trials", "2")) as other,
-        in_domain(first, interpreter_with("jazzy"), NODE) as node,
-        in_domain(second, interpreter_with("kilted"), NODE) as another,
+        in_domain(first, interpreter_with("jazzy"), node_file) as node,
+        in_domain(second, interpreter_with("kilted"), node_file) as another,
     ):
         assert ends(one) == ["duration"] * 2
         assert ends(other) == ["duration"] * 2
@@ -123,13 +138,13 @@ def test_two_sessions_in_two_domains(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("version", VERSIONS)
-def test_a_killed_node_is_lost_at_once(version: str, tmp_path: Path) -> None:
+def test_a_killed_node_is_lost_at_once(version: str, node_file: str, tmp_path: Path) -> None:
     """DDS itself would notice after twenty seconds; the silence that is borne here is longer."""
     domain, python = kept_domain(), interpreter_with(version)
     document = dt.load_config("demo").to_document() | {"duration_bounds": [1000, 1000]}
     (tmp_path / "long.json").write_text(json.dumps(document))
     arguments = session(str(tmp_path / "long.json"), "--trials", "1", "--silence", "900")
-    with in_domain(domain, *arguments) as run, in_domain(domain, python, NODE) as node:
+    with in_domain(domain, *arguments) as run, in_domain(domain, python, node_file) as node:
         assert run.stderr is not None
         for line in run.stderr:
             if "first command" in line:
@@ -144,3 +159,74 @@ def test_a_killed_node_is_lost_at_once(version: str, tmp_path: Path) -> None:
         assert b"geometry_msgs/msg/Twist" in time_in.stdout
         node.kill()
         assert ends(run) == ["peer_lost"]
+
+
+MAIN = """
+#include <iostream>
+#include "controller.hpp"
+
+int main() {
+    Driver driver;
+    std::string problem;
+    std::getline(std::cin, problem);
+    driver.begin(problem);
+    nav_msgs::msg::Odometry seen;
+    auto &pose = seen.pose.pose;
+    while (std::cin >> pose.position.x >> pose.position.y >> pose.orientation.z >> pose.orientation.w) {
+        const auto command = driver.command(seen);
+        std::cout << command.linear.x << " " << command.angular.z << std::endl;
+    }
+    driver.begin("");
+    std::cout << (driver.idle() ? "idle" : "busy") << std::endl;
+}
+"""
+"""Drives where the lines say that the ego is."""
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_the_driver_in_cpp_goes_round_the_goals(version: str, nodes: Path) -> None:
+    """It is built against the messages of ROS 2; rclcpp, of which the node itself is made, has no wheel."""
+    include = Path(interpreter_with(version)).parents[1] / "include"
+    (nodes / "main.cpp").write_text(MAIN)
+    build = ["g++", "-std=c++17", "-Wall", "-Wextra", "-Werror", "main.cpp", "-o", "drive"]
+    build += [f"-isystem{folder}" for folder in sorted(include.iterdir())]
+    subprocess.run(build, cwd=nodes, check=True)
+    instance = dt.draw(dt.load_config("town"), 1, 0)
+    goals = [tuple(instance.problem.network.points[v]) for v in instance.problem.goal_vertices]
+    with subprocess.Popen(
+        [nodes / "drive"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as driver:
+        assert driver.stdin is not None
+        assert driver.stdout is not None
+        driver.stdin.write(json.dumps(instance_to_document(instance, version=0)) + "\n")
+        pose, met = tuple(instance.starts[0]), list[int]()
+        for _ in range(5_000):
+            x, y, c, s = pose
+            turn = math.atan2(s, c) / 2.0
+            driver.stdin.write(f"{x} {y} {math.sin(turn)} {math.cos(turn)}\n")
+            driver.stdin.flush()
+            speed, yaw_rate = map(float, driver.stdout.readline().split())
+            pose = advance(*pose, speed, yaw_rate, 1.0 / 30.0)
+            near = [
+                k
+                for k, goal in enumerate(goals)
+                if math.dist(goal, pose[:2]) < instance.problem.intersection_radius / 2.0
+            ]
+            met += [k for k in near if met[-1:] != [k]]
+        out, _ = driver.communicate(timeout=PATIENCE)
+    assert out == "idle\n"
+    assert len(goals) > 1
+    assert len(met) > 2 * len(goals)
+    assert met == [k % len(goals) for k in range(len(met))]
+
+
+def test_the_package_is_one_that_colcon_knows(nodes: Path) -> None:
+    """Debian's catkin_pkg reads it; the launch file is Python."""
+    asked = "import sys; from catkin_pkg.package import parse_package; print(parse_package(sys.argv[1]).name)"
+    told = subprocess.run(
+        ["/usr/bin/python3", "-c", asked, nodes], capture_output=True, text=True, check=True
+    ).stdout
+    assert told == "traffic_nodes\n"
+    compile((nodes / "trials.launch.py").read_text(), "trials.launch.py", "exec")
+    installed = (nodes / "CMakeLists.txt").read_text()
+    assert all(name in installed for name in ("controller.cpp", "controller.py", "trials.launch.py"))

@@ -10,24 +10,32 @@ import typer
 
 from dubins_traffic.cli import options
 
-EXAMPLES = options.examples("template python my_entry", "template cpp my_entry")
+EXAMPLES = options.examples(
+    "template python my_entry", "template cpp my_entry", "template ros2 workspace/src/traffic_nodes"
+)
 
 
-class Language(StrEnum):
-    """Languages of which there is a template."""
+class Kind(StrEnum):
+    """What there is a template of."""
 
     PYTHON = "python"
     CPP = "cpp"
+    ROS2 = "ros2"
 
 
 def template(
-    language: Annotated[
-        Language, typer.Argument(metavar="python|cpp", help="Language of the submission.", show_default=False)
+    kind: Annotated[
+        Kind,
+        typer.Argument(
+            metavar="python|cpp|ros2",
+            help="A submission in that language, or nodes in both and a launch file.",
+            show_default=False,
+        ),
     ],
     folder: Annotated[str, typer.Argument(metavar="DIR", help="A folder to make.", show_default=False)],
 ) -> None:
-    """Make a folder with a submission that can be evaluated as it is, to begin from."""
+    """Make a folder to begin from: a submission that can be evaluated as it is, or a package of nodes of ROS 2."""
     from dubins_traffic.competition.templates import write_template
 
-    for path in write_template(language.value, Path(folder)):
+    for path in write_template(kind.value, Path(folder)):
         options.tell(str(path))

@@ -1,4 +1,4 @@
-"""Folders to begin from: a competition, and submissions in Python and C++."""
+"""Folders to begin from: a competition, submissions in Python and C++, and a package of nodes of ROS 2."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ _SUFFIX = ".txt"
 
 
 def template_files(kind: str) -> dict[str, str]:
-    """Return the files of a template by name; `kind` is ``competition``, ``python`` or ``cpp``.
+    """Return the files of a template by name; `kind` is ``competition``, ``python``, ``cpp`` or ``ros2``.
 
     InputError if there is none of that kind.
     """
     folder = files("dubins_traffic.competition") / "templates" / kind
     if not folder.is_dir():
-        raise InputError("no such template", value=kind, expected="competition, python or cpp")
+        raise InputError("no such template", value=kind, expected="competition, python, cpp or ros2")
     return {name.removesuffix(_SUFFIX): text for name, text in sorted(_texts(folder))}
 
 
