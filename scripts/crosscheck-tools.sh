@@ -51,8 +51,10 @@ environment baselines ompl,pyrvo --no-deps -r experiments/baselines/orca/constra
   -r experiments/baselines/mpc/constraints.txt -r experiments/baselines/rrt/constraints.txt
 environment tulip tulip.spec.form 'tulip==1.4.0' 'polytope==0.2.5' setuptools
 environment omega dd.cudd,omega.games.gr1 'omega==0.4.0' 'dd==0.6.0' setuptools
-environment jazzy rclpy 'ros-rclpy~=7.1.6' 'ros-rmw-fastrtps-cpp~=8.4' 'ros-nav-msgs~=5.3'
-environment kilted rclpy 'ros-rclpy~=9.1.2' 'ros-rmw-fastrtps-cpp~=9.3' 'ros-nav-msgs~=5.5'
+environment jazzy rclpy,visualization_msgs 'ros-rclpy~=7.1.6' 'ros-rmw-fastrtps-cpp~=8.4' 'ros-nav-msgs~=5.3' \
+  'ros-visualization-msgs~=5.3'
+environment kilted rclpy,visualization_msgs 'ros-rclpy~=9.1.2' 'ros-rmw-fastrtps-cpp~=9.3' 'ros-nav-msgs~=5.5' \
+  'ros-visualization-msgs~=5.5'
 environment commonroad commonroad.common.file_reader 'commonroad-io==2026.1'
 wait
 

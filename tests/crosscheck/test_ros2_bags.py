@@ -18,7 +18,7 @@ from mcap_ros2.decoder import DecoderFactory
 import dubins_traffic as dt
 from dubins_traffic.cli.main import main
 from dubins_traffic.interchange.bags import ros2_typestore
-from dubins_traffic.interchange.ros2_bags import BREACHES, CARS, CUBE, CYLINDER, GREEN, ROADS, STRIP
+from dubins_traffic.transports.marks import BREACHES, CARS, CUBE, CYLINDER, GREEN, ROADS, STRIP
 from tests.tools import interpreter_with
 
 pytestmark = pytest.mark.path

@@ -22,6 +22,7 @@ import dubins_traffic as dt
 from dubins_traffic.competition.templates import write_template
 from dubins_traffic.kernels.trig import advance
 from dubins_traffic.problem.document import instance_to_document
+from dubins_traffic.transports import marks
 from dubins_traffic.transports.ros2 import messages as m
 from tests.beside import in_domain
 from tests.ports import kept_domain
@@ -83,7 +84,7 @@ def test_types_have_the_hashes_of_ros_2(version: str) -> None:
         if told.exists() and package != "rmw_dds_common":  # bounds of its texts are left out
             assert json.loads(told.read_text())["type_hashes"][0]["hash_string"] == m.type_hash(kind)
             compared += 1
-    assert compared >= 12
+    assert compared >= 16
 
 
 @pytest.mark.parametrize("version", VERSIONS)
@@ -159,6 +160,34 @@ def test_a_killed_node_is_lost_at_once(version: str, node_file: str, tmp_path: P
         assert b"geometry_msgs/msg/Twist" in time_in.stdout
         node.kill()
         assert ends(run) == ["peer_lost"]
+
+
+@pytest.mark.parametrize("version", VERSIONS)
+def test_markers_show_roads_and_cars(version: str) -> None:
+    """As RViz would draw them; of the roads who comes late is told, too."""
+    domain, python = kept_domain(), interpreter_with(version)
+    with (
+        in_domain(domain, *session("town", "--trials", "1", "--markers")) as run,
+        in_domain(domain, python, str(ROOT / "tests" / "rclpy_markers.py")) as viewer,
+    ):
+        out, err = viewer.communicate(timeout=PATIENCE)
+        assert err == ""
+        run.send_signal(signal.SIGINT)
+        run.communicate(timeout=PATIENCE)
+    shown = json.loads(out)
+    instance = dt.draw(dt.load_config("town"), 1, 0)
+    problem, cars = instance.problem, len(instance.names)
+    wipe, *roads = shown["roads"]
+    assert wipe[:5] == ["map", "", 0, 0, marks.DELETE_ALL]
+    groups = [one[1] for one in roads]
+    assert groups.count("roads") == groups.count("lines") == problem.network.lanes // 2
+    assert groups.count("intersections") == len(problem.network.points)
+    bodies = [one for one in shown["cars"] if one[1] == "bodies"]
+    assert [one[2] for one in bodies] == list(range(cars))
+    for one, start in zip(bodies, instance.starts, strict=True):
+        assert one[5:7] == [start.x, start.y]
+        assert one[8] ** 2 - one[7] ** 2 == pytest.approx(start.c)
+        assert one[11] == 1.0
 
 
 MAIN = """

@@ -16,7 +16,6 @@ from typing import Any, Final
 
 import numpy as np
 
-from dubins_traffic.cars.body import DiscObstacle, Rectangle
 from dubins_traffic.cars.state import Frames
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import require_output
@@ -32,24 +31,12 @@ from dubins_traffic.interchange.bags import (
 )
 from dubins_traffic.record.reader import Record
 from dubins_traffic.scoring.score import score
+from dubins_traffic.transports import marks
 from dubins_traffic.transports.labels import words
 from dubins_traffic.transports.ros1.world import BASE
 
-ROADS, CARS, BREACHES = (f"/dubins_traffic/{name}" for name in ("roads", "cars", "breaches"))
-"""Topics of markers: the first once, the second in each frame, the third when a rule is broken."""
-LATCHED: Final = frozenset({PROBLEM, INSTANCE, LABELS, NOTES, ROADS, BREACHES, "/tf_static"})
+LATCHED: Final = frozenset({PROBLEM, INSTANCE, LABELS, NOTES, marks.ROADS, marks.BREACHES, "/tf_static"})
 """Topics whose last messages who comes late is given."""
-SHOWN_FOR: Final = 3
-"""Seconds for which a breach is shown."""
-GREY, LINE, PALE, GREEN, BROWN, BLUE, ORANGE, RED = (
-    (0.35, 0.35, 0.38), (0.9, 0.9, 0.9), (0.45, 0.45, 0.48), (0.3, 0.7, 0.35), (0.5, 0.35, 0.2), (0.15, 0.4, 0.8),
-    (0.9, 0.55, 0.1), (0.85, 0.1, 0.1),
-)  # fmt: skip
-Color = tuple[float, float, float]
-ARROW, CUBE, CYLINDER, STRIP, TEXT = 0, 1, 3, 4, 9
-"""Types of markers."""
-ADD = 0
-"""What is done with a marker."""
 
 
 def write_ros2_bag(record: Record, path: Path | str, *, overwrite: bool = False) -> None:
@@ -108,7 +95,7 @@ class _Ros2BagWriter(BagWriter):
 
     def _put_still(self) -> None:
         super()._put_still()
-        self._put_roads()
+        self._put_marks(marks.ROADS, BEGIN, marks.of_world(self._instance.problem))
         self._put_mounts()
         self._breaches = _breaches(self._record)
 
@@ -119,15 +106,18 @@ class _Ros2BagWriter(BagWriter):
         self._put(LABELS, "std_msgs/msg/String", time, text)
         poses = self._put_cars(frames, f, time)
         self._put_transforms(poses, time)
-        self._put_markers(
-            CARS, time, [one for n, pose in enumerate(poses) for one in self._car(n, pose, time)]
+        body = instance.problem.car.body
+        turned = [(pose.position, (pose.orientation.z, pose.orientation.w)) for pose in poses]
+        self._put_marks(
+            marks.CARS,
+            time,
+            [one for n, (at, turn) in enumerate(turned) for one in marks.of_car(n, body, at.x, at.y, turn)],
         )
         for n, rule in self._breaches.get(f, ()):
-            said = f"{instance.names[n]}: {rule}"
-            place = self._at(float(frames.x[f, n]), float(frames.y[f, n]), 0.5)
-            lasting = {"text": said, "lifetime": self._make("builtin_interfaces/msg/Duration", SHOWN_FOR, 0)}
-            shown = self._marker("breaches", f, TEXT, place, (0.0, 0.0, 0.3), RED, time=time, **lasting)
-            self._put_markers(BREACHES, time, [shown])
+            place = float(frames.x[f, n]), float(frames.y[f, n])
+            self._put_marks(
+                marks.BREACHES, time, [marks.of_breach(f, f"{instance.names[n]}: {rule}", *place)]
+            )
 
     def _put_transforms(self, poses: Iterable[Any], time: int) -> None:
         """Put where each car's footprint is by its odometry."""
@@ -153,84 +143,35 @@ class _Ros2BagWriter(BagWriter):
         moved = self._make("geometry_msgs/msg/Transform", self._vector(place.x, place.y, place.z), turn)
         return self._make("geometry_msgs/msg/TransformStamped", self._header(time, parent), child, moved)
 
-    def _put_roads(self) -> None:
-        """Put what does not move: roads, their middle lines, discs of intersections, goals, obstacles."""
-        problem = self._instance.problem
-        network, wide = problem.network, 2.0 * problem.car.lane_width
-        shown: list[Any] = []
-        for s in range(network.lanes // 2):
-            points = [self._point(x, y) for x, y in network.lane_curve(2 * s, 0.0).tolist()]
-            shown.append(self._marker("roads", s, STRIP, self._at(), (wide, 0.0, 0.0), GREY, points=points))
-            shown.append(
-                self._marker("lines", s, STRIP, self._at(z=0.01), (0.03, 0.0, 0.0), LINE, points=points)
-            )
-        across = 2.0 * problem.intersection_radius
-        for v, (x, y) in enumerate(network.points.tolist()):
-            colour = GREEN if v in problem.goal_vertices else PALE
-            place = self._at(x, y, 0.005)
-            shown.append(self._marker("intersections", v, CYLINDER, place, (across, across, 0.01), colour))
-        for k, obstacle in enumerate(problem.obstacles):
-            if isinstance(obstacle, DiscObstacle):
-                size = (2.0 * obstacle.radius, 2.0 * obstacle.radius, 0.3)
-                shown.append(
-                    self._marker(
-                        "obstacles", k, CYLINDER, self._at(obstacle.x, obstacle.y, 0.15), size, BROWN
-                    )
-                )
-            else:
-                corners = [self._point(x, y) for x, y in (*obstacle.vertices, obstacle.vertices[0])]
-                shown.append(
-                    self._marker(
-                        "obstacles", k, STRIP, self._at(z=0.1), (0.05, 0.0, 0.0), BROWN, points=corners
-                    )
-                )
-        self._put_markers(ROADS, BEGIN, shown)
+    def _put_marks(self, topic: str, time: int, shown: Iterable[marks.Mark]) -> None:
+        self._put(
+            topic, "visualization_msgs/msg/MarkerArray", time, [self._marker(one, time) for one in shown]
+        )
 
-    def _car(self, n: int, pose: Any, time: int) -> list[Any]:
-        """Return a car's body and an arrow along its heading."""
-        body, colour = self._instance.problem.car.body, BLUE if n == 0 else ORANGE
-        place = self._at(pose.position.x, pose.position.y, 0.1, pose.orientation)
-        over = self._at(pose.position.x, pose.position.y, 0.22, pose.orientation)
-        if isinstance(body, Rectangle):
-            kind, size = CUBE, (body.length, body.width, 0.2)
-        else:
-            kind, size = CYLINDER, (2.0 * body.radius, 2.0 * body.radius, 0.2)
-        return [
-            self._marker("bodies", n, kind, place, size, colour, time=time),
-            self._marker("headings", n, ARROW, over, (0.3, 0.05, 0.05), LINE, time=time),
-        ]
-
-    def _put_markers(self, topic: str, time: int, markers: list[Any]) -> None:
-        self._put(topic, "visualization_msgs/msg/MarkerArray", time, markers)
-
-    def _marker(
-        self, group: str, number: int, kind: int, pose: Any, scale: tuple[float, float, float], color: Color,
-        *, time: int = BEGIN, points: Iterable[Any] = (), text: str = "", lifetime: Any = None,
-    ) -> Any:  # fmt: skip
-        lasts = lifetime or self._make("builtin_interfaces/msg/Duration", 0, 0)
+    def _marker(self, mark: marks.Mark, time: int) -> Any:
         header, nothing = self._header(time, "map"), np.zeros(0, dtype=np.uint8)
+        points = [self._make("geometry_msgs/msg/Point", x, y, 0.0) for x, y in mark.points]
         image = self._make("sensor_msgs/msg/CompressedImage", header, "", nothing)
         mesh = self._make("visualization_msgs/msg/MeshFile", "", nothing)
         return self._make(
-            "visualization_msgs/msg/Marker", header, group, number, kind, ADD, pose, self._vector(*scale),
-            self._make("std_msgs/msg/ColorRGBA", *color, 1.0), lasts, False, list(points), [], "", image, [], text, "",
-            mesh, False,
+            "visualization_msgs/msg/Marker", header, mark.group, mark.number, mark.kind, marks.ADD, self._at(mark),
+            self._vector(*mark.scale), self._make("std_msgs/msg/ColorRGBA", *mark.color, 1.0),
+            self._make("builtin_interfaces/msg/Duration", mark.seconds, 0), False, points, [], "", image, [],
+            mark.text, "", mesh, False,
         )  # fmt: skip
 
     def _make(self, kind: str, *fields: Any) -> Any:
         return self._store.types[kind](*fields)
 
-    def _point(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
-        return self._make("geometry_msgs/msg/Point", x, y, z)
-
     def _vector(self, x: float = 0.0, y: float = 0.0, z: float = 0.0) -> Any:
         return self._make("geometry_msgs/msg/Vector3", x, y, z)
 
-    def _quaternion(self) -> Any:
-        return self._make("geometry_msgs/msg/Quaternion", 0.0, 0.0, 0.0, 1.0)
+    def _quaternion(self, z: float = 0.0, w: float = 1.0) -> Any:
+        return self._make("geometry_msgs/msg/Quaternion", 0.0, 0.0, z, w)
 
-    def _at(self, x: float = 0.0, y: float = 0.0, z: float = 0.0, turn: Any = None) -> Any:
-        return self._make("geometry_msgs/msg/Pose", self._point(x, y, z), turn or self._quaternion())
+    def _at(self, mark: marks.Mark) -> Any:
+        point = self._make("geometry_msgs/msg/Point", *mark.place)
+        return self._make("geometry_msgs/msg/Pose", point, self._quaternion(*mark.turn))
 
 
 def _breaches(record: Record) -> dict[int, list[tuple[int, str]]]:

@@ -214,6 +214,12 @@ TRANSPORTS: dict[str, TransportEntry] = {
             ),
             ELSEWHERE,
             CLOCK,
+            Option(
+                "--markers",
+                bool,
+                "Publish markers of roads, goals and cars for RViz: /dubins_traffic/roads, /dubins_traffic/cars.",
+                default=False,
+            ),
             *_outside("ros2-world"),
         ),
     ),

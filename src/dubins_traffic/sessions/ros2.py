@@ -26,12 +26,15 @@ def make_transport(
     here: bool = True,
     clock: bool = False,
     simulated: bool = True,
+    markers: bool = False,
     foreign: ForeignMaestro | None = None,
 ) -> Ros2:
     """Return the transport; MissingExtraError if the extra `ros2` is not installed."""
     with needs("ROS 2", "ros2"):
         from dubins_traffic.transports.ros2.transport import Ros2
-    return Ros2(domain, maestro=maestro, here=here, clock=clock, simulated=simulated, foreign=foreign)
+    return Ros2(
+        domain, maestro=maestro, here=here, clock=clock, simulated=simulated, markers=markers, foreign=foreign
+    )
 
 
 def run_over_ros2(
@@ -42,6 +45,7 @@ def run_over_ros2(
     wide: bool = False,
     elsewhere: bool = False,
     clock: bool = False,
+    markers: bool = False,
     simulator: str | None = None,
     poses: str | None = None,
     delay: float | None = None,
@@ -60,6 +64,8 @@ def run_over_ros2(
         Whether another process is the maestro: it tells problems, and starts and ends trials.
     clock : bool
         Whether `/clock` is published, and messages are stamped with simulated time.
+    markers : bool
+        Whether markers of roads, goals and cars are published, which RViz shows.
     simulator, poses, delay, noise, loss : optional
         What moves the cars, as `sessions.outside.Outside` has it; ``ros2-world``: they are somewhere in the domain, in
         real time.
@@ -78,7 +84,7 @@ def run_over_ros2(
     maestro = Maestro() if session_plan.controller is None and not elsewhere else None
     foreign = ForeignMaestro() if elsewhere else None
     transport = make_transport(
-        domain, maestro, here=not wide, clock=clock, simulated=not outside, foreign=foreign
+        domain, maestro, here=not wide, clock=clock, simulated=not outside, markers=markers, foreign=foreign
     )
     where = f"DDS domain {transport.domain}{'' if wide else ', within this machine'}"
     session_plan = session_plan.claim(transport.name)

@@ -15,10 +15,12 @@ if TYPE_CHECKING:
     Covariance = list[float]
     Ranges = list[float]
     Octets = list[int]
+    Data = list[int]
 else:
     Covariance = array[float, 36]
     Ranges = sequence[float32]
     Octets = array[uint8, 16]
+    Data = sequence[uint8]
 
 
 def _no_covariance() -> list[float]:
@@ -181,6 +183,97 @@ class PoseStamped(IdlStruct, typename="geometry_msgs::msg::dds_::PoseStamped_"):
 
     header: Header = field(default_factory=Header)
     pose: Pose = field(default_factory=Pose)
+
+
+@dataclass
+class Duration(IdlStruct, typename="builtin_interfaces::msg::dds_::Duration_"):
+    """A length of time."""
+
+    sec: int32 = 0
+    nanosec: uint32 = 0
+
+
+@dataclass
+class ColorRGBA(IdlStruct, typename="std_msgs::msg::dds_::ColorRGBA_"):
+    """A colour; parts are from 0 to 1."""
+
+    r: float32 = 0.0
+    g: float32 = 0.0
+    b: float32 = 0.0
+    a: float32 = 1.0
+
+
+@dataclass
+class CompressedImage(IdlStruct, typename="sensor_msgs::msg::dds_::CompressedImage_"):
+    """A picture."""
+
+    header: Header = field(default_factory=Header)
+    format: str = ""
+    data: Data = field(default_factory=list[int])
+
+
+@dataclass
+class UVCoordinate(IdlStruct, typename="visualization_msgs::msg::dds_::UVCoordinate_"):
+    """A place in a picture."""
+
+    u: float32 = 0.0
+    v: float32 = 0.0
+
+
+@dataclass
+class MeshFile(IdlStruct, typename="visualization_msgs::msg::dds_::MeshFile_"):
+    """A mesh."""
+
+    filename: str = ""
+    data: Data = field(default_factory=list[int])
+
+
+if TYPE_CHECKING:
+    Points = list[Point]
+    Colors = list[ColorRGBA]
+    Coordinates = list[UVCoordinate]
+else:
+    Points = sequence[Point]
+    Colors = sequence[ColorRGBA]
+    Coordinates = sequence[UVCoordinate]
+
+
+@dataclass
+class Marker(IdlStruct, typename="visualization_msgs::msg::dds_::Marker_"):
+    """What RViz draws (`transports.marks`)."""
+
+    header: Header = field(default_factory=Header)
+    ns: str = ""
+    id: int32 = 0
+    type: int32 = 0
+    action: int32 = 0
+    pose: Pose = field(default_factory=Pose)
+    scale: Vector3 = field(default_factory=Vector3)
+    color: ColorRGBA = field(default_factory=ColorRGBA)
+    lifetime: Duration = field(default_factory=Duration)
+    frame_locked: bool = False
+    points: Points = field(default_factory=list[Point])
+    colors: Colors = field(default_factory=list[ColorRGBA])
+    texture_resource: str = ""
+    texture: CompressedImage = field(default_factory=CompressedImage)
+    uv_coordinates: Coordinates = field(default_factory=list[UVCoordinate])
+    text: str = ""
+    mesh_resource: str = ""
+    mesh_file: MeshFile = field(default_factory=MeshFile)
+    mesh_use_embedded_materials: bool = False
+
+
+if TYPE_CHECKING:
+    Markers = list[Marker]
+else:
+    Markers = sequence[Marker]
+
+
+@dataclass
+class MarkerArray(IdlStruct, typename="visualization_msgs::msg::dds_::MarkerArray_"):
+    """Markers."""
+
+    markers: Markers = field(default_factory=list[Marker])
 
 
 @dataclass

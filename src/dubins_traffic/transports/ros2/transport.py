@@ -138,6 +138,8 @@ class Ros2:
         How many views of the world a second are published in real time, at least.
     simulated : bool
         Whether the cars are simulated here; else only labels are published, and what is the maestro's.
+    markers : bool
+        Whether markers for RViz are published (`transports.marks`).
     foreign : ForeignMaestro, optional
         Another process is the maestro, and this is told what that says.
     """
@@ -154,13 +156,14 @@ class Ros2:
         clock: bool = False,
         rate: float = 120.0,
         simulated: bool = True,
+        markers: bool = False,
         foreign: ForeignMaestro | None = None,
     ) -> None:
         self.interval = 1.0 / rate
         self._clock, self._stamps = clock, Stamps(self.interval, clock=clock)
         self.domain = usual_domain() if domain is None else domain
         self._maestro, self._here = maestro, here
-        self._simulated_here, self._foreign = simulated, foreign
+        self._simulated_here, self._markers, self._foreign = simulated, markers, foreign
         self._readers: dict[str, Any] = {}
         self._there: dict[str, int] = {}
         self._places: dict[str, Any] = {}
@@ -178,7 +181,9 @@ class Ros2:
         self._mailbox = mailbox
         self._graph = Graph(self.domain, here=self._here)
         self._open = True
-        self._world = Ros2Publishers(self._graph, clock=self._clock, simulated=self._simulated_here)
+        self._world = Ros2Publishers(
+            self._graph, clock=self._clock, simulated=self._simulated_here, markers=self._markers
+        )
         if self._foreign is not None:
             self._topics = ForeignTopics(self._graph, self._foreign)
             return

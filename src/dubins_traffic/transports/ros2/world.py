@@ -1,14 +1,15 @@
-"""What a session publishes of its cars over ROS 2: odometry, transforms, scans, labels, time."""
+"""What a session publishes of its cars over ROS 2: odometry, transforms, scans, labels, time, markers."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import floor
 from typing import TYPE_CHECKING, Any
 
 from dubins_traffic.observations.senses import Senses
 from dubins_traffic.problem.parts import Laser
 from dubins_traffic.protocols import View
+from dubins_traffic.transports import marks
 from dubins_traffic.transports.labels import Caption
 from dubins_traffic.transports.ros import half
 from dubins_traffic.transports.ros1.world import BASE
@@ -33,11 +34,13 @@ class Ros2Publishers:
     clock : bool
         Whether `/clock` is published.
     simulated : bool
-        Whether the cars are simulated here; else only labels are published.
+        Whether the cars are simulated here; else only labels and markers are published.
+    markers : bool
+        Whether markers for RViz are published.
     """
 
-    def __init__(self, graph: Graph, *, clock: bool, simulated: bool) -> None:
-        self._graph, self._clock, self._simulated = graph, clock, simulated
+    def __init__(self, graph: Graph, *, clock: bool, simulated: bool, markers: bool = False) -> None:
+        self._graph, self._clock, self._simulated, self._markers = graph, clock, simulated, markers
         self._writers: dict[str, Any] = {}
 
     def begin(self, instance: Instance) -> None:
@@ -47,6 +50,8 @@ class Ros2Publishers:
         self._laser = instance.problem.laser or Laser()
         self._senses = [Senses(instance, n, laser=self._laser) for n in range(len(instance.names))]
         self._swept = -1
+        self._body = instance.problem.car.body
+        self._world, self._is_new = marks.of_world(instance.problem), True
 
     def publish(self, view: View, stamp: float, simulated: float) -> None:
         """Publish `view`, stamped so (seconds); the ego's odometry comes last.
@@ -58,6 +63,8 @@ class Ros2Publishers:
             self._put(CLOCK, m.Clock, lambda: m.Clock(time))
         self._caption.update(view.labels)
         self._put(LABELS, m.String, lambda: m.String(" ".join(self._caption.words)), latched=True)
+        if self._markers:
+            self._put_marks(view, time)
         if not self._simulated:
             return
         sweep = floor(simulated * self._laser.rate + 1e-6)
@@ -68,6 +75,23 @@ class Ros2Publishers:
         self._put(TRANSFORMS, m.TFMessage, lambda: self._transforms(view, time))
         for n in reversed(range(len(self._names))):
             self._put(f"rt/{self._names[n]}/odom", m.Odometry, lambda n=n: self._odometry(view, n, time))
+
+    def _put_marks(self, view: View, time: m.Time) -> None:
+        """Put markers of the cars, and of their world when it is new: all of the one before go first."""
+        if self._is_new:
+            self._put(
+                f"rt{marks.ROADS}", m.MarkerArray, lambda: _shown(self._world, time, True), latched=True
+            )
+        is_new, self._is_new = self._is_new, False
+        self._put(f"rt{marks.CARS}", m.MarkerArray, lambda: _shown(self._cars(view), time, is_new))
+
+    def _cars(self, view: View) -> list[marks.Mark]:
+        poses = [tuple(float(row[0, n]) for row in view.state[:4]) for n in range(len(self._names))]
+        return [
+            mark
+            for n, (x, y, c, s) in enumerate(poses)
+            for mark in marks.of_car(n, self._body, x, y, half(c, s))
+        ]
 
     def _put(self, topic: str, kind: Any, make: Callable[[], Any], *, latched: bool = False) -> None:
         if topic not in self._writers:
@@ -110,6 +134,22 @@ class Ros2Publishers:
             range_max=laser.range_max,
             ranges=self._senses[n].sweep(view.state).tolist(),
         )
+
+
+def _shown(shown: Sequence[marks.Mark], stamp: m.Time, is_new: bool) -> m.MarkerArray:
+    """Return marks as markers; those of a new world come after one that takes away what was shown before."""
+    header = m.Header(stamp, "map")
+    wipe = [m.Marker(header, action=marks.DELETE_ALL)] if is_new else []
+    return m.MarkerArray(wipe + [_marker(mark, header) for mark in shown])
+
+
+def _marker(mark: marks.Mark, header: m.Header) -> m.Marker:
+    return m.Marker(
+        header, mark.group, mark.number, mark.kind, marks.ADD,
+        m.Pose(m.Point(*mark.place), m.Quaternion(0.0, 0.0, *mark.turn)),
+        m.Vector3(*mark.scale), m.ColorRGBA(*mark.color), m.Duration(mark.seconds),
+        points=[m.Point(x, y) for x, y in mark.points], text=mark.text,
+    )  # fmt: skip
 
 
 def moment(seconds: float) -> m.Time:
