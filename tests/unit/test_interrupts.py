@@ -1,13 +1,17 @@
 """Ctrl-C is heard between frames: every sink has every frame, and the record is one that can be verified."""
 
 import os
+import random
 import signal
+import sys
 import threading
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
 import dubins_traffic as dt
+from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.trial.interrupts import WHOLE, heard_between_frames
@@ -87,3 +91,30 @@ def test_what_came_is_heard_at_the_end_and_elsewhere_at_once() -> None:
         with pytest.raises(KeyboardInterrupt):
             interrupted()
     assert told == ["heard late"]
+
+
+def test_an_interrupt_at_any_call_is_heard() -> None:
+    """Also in what NumPy calls by itself: it drops whatever is raised while it describes an array."""
+
+    def play(last: int | None) -> int:
+        """Run trials, interrupted at the call of that number, if any; return how many calls there were."""
+        calls = 0
+
+        def count(_frame: FrameType, _event: str, _given: object) -> None:
+            nonlocal calls
+            calls += 1
+            if calls == last:
+                sys.setprofile(None)
+                signal.raise_signal(signal.SIGINT)
+
+        sys.setprofile(count)
+        try:
+            list(outcomes([INSTANCE] * 2, "simple", batch=2))
+        finally:
+            sys.setprofile(None)
+        return calls
+
+    play(None)
+    for last in random.Random(1).sample(range(1, play(None) - 100), 80):
+        with pytest.raises(KeyboardInterrupt):
+            play(last)
