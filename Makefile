@@ -57,6 +57,7 @@ test-all: test test-tools ## all tests, then those of which the suite runs a par
 	DUBINS_TRAFFIC_ATTACKS=all $(BIN)/python -m pytest tests/sandbox/test_second_version.py
 	DUBINS_TRAFFIC_PAGES=all $(BIN)/python -m pytest tests/integration/test_docs_code.py \
 		tests/integration/test_readme.py -k runs
+	DUBINS_TRAFFIC_PAGES=all $(BIN)/python -m pytest tests/integration/test_site.py -k both_widths
 	DUBINS_TRAFFIC_ESTIMATES=full $(BIN)/python -m pytest tests/integration/test_falsify.py \
 		tests/integration/test_falsify_targets.py tests/integration/test_splitting.py \
 		-k "splitting or million or guides"
