@@ -11,6 +11,7 @@ commands lost; of the ego alone, and of all cars, in which nobody may break a ru
 from __future__ import annotations
 
 import sys
+from itertools import product
 from typing import Final, Literal, NamedTuple
 
 from benchmarks.table import Row, show
@@ -51,16 +52,16 @@ def rows(who: Who, trials: int) -> list[Row]:
 def _column(who: Who, noise: float, trials: int) -> dict[tuple[int, float], str]:
     """Return what came of the trials with so much noise (m), by delay and loss; nothing of those that are refused."""
     found: dict[tuple[int, float], str] = {}
-    for delay in DELAYS:
+    for delay, loss in product(DELAYS, LOSSES):
         try:
-            cells = robustness(
-                who.controller, trials=trials, workers=2, delays=[delay], noises=[noise], cars=who.cars
-            ).cells
+            (cell,) = robustness(
+                who.controller, trials=trials, workers=2, delays=[delay], noises=[noise], losses=[loss],
+                cars=who.cars,
+            ).cells  # fmt: skip
         except InputError as refused:
-            print(f"{who}, {delay} ticks, {1000 * noise:g} mm: {refused}", file=sys.stderr)
+            print(f"{who}, {delay} ticks, {1000 * noise:g} mm, {loss:.0%} lost: {refused}", file=sys.stderr)
             continue
-        for cell in cells:
-            found[cell.delay, cell.loss] = str(min(cell.clean, cell.trials - cell.others_broke))
+        found[delay, loss] = str(min(cell.clean, cell.trials - cell.others_broke))
     return found
 
 
