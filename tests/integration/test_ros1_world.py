@@ -107,6 +107,7 @@ def test_a_delay_that_is_declared_is_not_measured(tmp_path: Path) -> None:
         options += ["--records", str(tmp_path / "out"), "--delay", "0.3", "--noise", "0.03"]
         status, _, err = finish(ros.session(configuration(tmp_path, **{**COURSE, "duration": 1.0}), *options))
     assert status in (0, 1), err
+    assert "commands take effect late (300 ms; " in err
     declared = dt.load_record(tmp_path / "out" / "trial-0000.mcap").instance.disturbances
     assert declared.command_delay >= 9
     assert declared.position_noise == pytest.approx(0.01)

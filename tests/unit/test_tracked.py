@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -64,6 +65,11 @@ def test_noise_and_age_of_poses_are_measured_while_cars_stand() -> None:
     assert 0.035 < found.interval < 0.04
 
 
+def test_cars_that_only_stand_tell_their_noise() -> None:
+    samples = [Sample(0.03 * k, 1.0 + 0.01 * (-1) ** k, 2.0, 0.0) for k in range(40)]
+    assert measured([samples]) == Measured(None, pytest.approx(0.01), 0.0, pytest.approx(0.03))
+
+
 def test_a_problem_declares_what_was_measured_or_given() -> None:
     problem = dt.draw(dt.load_config("town"), 1, 0).problem
     found = Measured(0.05, 0.012, 0.006, 1.0 / 30.0)
@@ -72,9 +78,10 @@ def test_a_problem_declares_what_was_measured_or_given() -> None:
     assert declared.position_noise == pytest.approx(0.004)
     assert declared.heading_noise == pytest.approx(0.002)
     assert "50 ms; 4 ticks" in found.told(problem, declared)
-    given_by_user = found.disturbances(problem, 0.1, 0.003)
+    given_by_user = replace(found, delay=0.1).disturbances(problem, 0.003, 0.5)
     assert given_by_user.command_delay == 5
     assert given_by_user.position_noise == pytest.approx(0.001)
+    assert (declared.command_loss, given_by_user.command_loss) == (0.05, 0.5)
     unknown = Measured(None, 0.0, 0.0, 0.01)
     assert unknown.disturbances(problem).command_delay == 2
     assert "--delay declares it" in unknown.told(problem, unknown.disturbances(problem))

@@ -91,24 +91,25 @@ class ExternalWorld:
         self._driven: list[str] = []
         self._samples: dict[str, list[Sample]] | None = None
 
-    def measure(self, instance: Instance) -> Measured:
+    def measure(self, instance: Instance, *, turn: bool = True) -> Measured:
         """Return how noisy poses are and how late commands take effect: cars that are driven here turn a little.
 
-        Cars that can't turn in place, or that nodes elsewhere drive, tell no delay.
+        Cars that can't turn in place, that nodes elsewhere drive, or that are not to `turn` tell no delay.
         """
         self._instance, bounds = instance, instance.problem.car.bounds
         self._listen()
         self._await()
         standing = self._sampled(0.0, STAND)
-        turns = bounds.turning_radius == 0.0 and bounds.speed_low <= 0.0
-        rate = min(RATE, 0.5 * bounds.yaw_rate) if turns else 0.0
+        if not (turn and bounds.turning_radius == 0.0 and bounds.speed_low <= 0.0):
+            return measured(list(standing.values()))
+        rate = min(RATE, 0.5 * bounds.yaw_rate)
         told = Turned(monotonic(), 0.0, 0.0, rate)
         seen = self._sampled(rate, TURN)
         told = replace(told, back=monotonic())
         back = self._sampled(-rate, TURN)
         told = replace(told, stood=monotonic())
         after = self._sampled(0.0, SETTLE)
-        turning = [seen[name] + back[name] + after[name] for name in self._driven] if rate else []
+        turning = [seen[name] + back[name] + after[name] for name in self._driven]
         return measured(list(standing.values()), turning, told)
 
     def _sampled(self, rate: float, seconds: float) -> dict[str, list[Sample]]:

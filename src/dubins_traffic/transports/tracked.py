@@ -55,16 +55,13 @@ class Measured:
     heading: float
     interval: float
 
-    def disturbances(
-        self, problem: Problem, delay: float | None = None, noise: float | None = None, loss: float = LOSS
-    ) -> Disturbances:
-        """Return them as what a problem declares; `delay` (s) and `noise` (m) replace what was measured.
+    def disturbances(self, problem: Problem, noise: float | None = None, loss: float = LOSS) -> Disturbances:
+        """Return them as what a problem declares; `noise` (m) replaces what was measured.
 
         A pose may be as old as the interval when it is read, and it is read a tick before the command that it leads to,
         so both count as delay.
         """
-        late = self.delay if delay is None else delay
-        ticks = 1 + math.ceil(((late or 0.0) + self.interval) * problem.rate - 1e-9)
+        ticks = 1 + math.ceil(((self.delay or 0.0) + self.interval) * problem.rate - 1e-9)
         position = self.position if noise is None else noise
         return Disturbances(
             command_delay=ticks, position_noise=position / CUT, heading_noise=self.heading / CUT,
@@ -100,7 +97,9 @@ class Turned:
 
 
 def measured(
-    standing: Sequence[Sequence[Sample]], turning: Sequence[Sequence[Sample]], told: Turned
+    standing: Sequence[Sequence[Sample]],
+    turning: Sequence[Sequence[Sample]] = (),
+    told: Turned | None = None,
 ) -> Measured:
     """Return what samples say.
 
@@ -110,8 +109,8 @@ def measured(
         Of each car while it stood.
     turning : sequence of sequences of Sample
         Of each car that was `told` to turn.
-    told : Turned
-        When and how fast.
+    told : Turned, optional
+        When and how fast; without it no delay is known.
     """
     position = heading = interval = 0.0
     for samples in standing:
@@ -120,7 +119,7 @@ def measured(
         position = max(position, float(np.abs(x - x.mean()).max()), float(np.abs(y - y.mean()).max()))
         heading = max(heading, float(np.abs(turned - turned.mean()).max()))
         interval = max(interval, float(np.diff([own.time for own in samples]).max(initial=0.0)))
-    delays = [found for samples in turning if (found := delay_of(samples, told)) is not None]
+    delays = [found for samples in turning if told and (found := delay_of(samples, told)) is not None]
     return Measured(max(delays, default=None), position, heading, interval)
 
 
