@@ -50,8 +50,7 @@ class Ros2Publishers:
         self._laser = instance.problem.laser or Laser()
         self._senses = [Senses(instance, n, laser=self._laser) for n in range(len(instance.names))]
         self._swept = -1
-        self._body = instance.problem.car.body
-        self._world, self._is_new = marks.of_world(instance.problem), True
+        self._problem, self._is_new = instance.problem, True
 
     def publish(self, view: View, stamp: float, simulated: float) -> None:
         """Publish `view`, stamped so (seconds); the ego's odometry comes last.
@@ -79,18 +78,16 @@ class Ros2Publishers:
     def _put_marks(self, view: View, time: m.Time) -> None:
         """Put markers of the cars, and of their world when it is new: all of the one before go first."""
         if self._is_new:
-            self._put(
-                f"rt{marks.ROADS}", m.MarkerArray, lambda: _shown(self._world, time, True), latched=True
-            )
+            world = marks.of_world(self._problem)
+            self._put(f"rt{marks.ROADS}", m.MarkerArray, lambda: _shown(world, time, True), latched=True)
         is_new, self._is_new = self._is_new, False
         self._put(f"rt{marks.CARS}", m.MarkerArray, lambda: _shown(self._cars(view), time, is_new))
 
     def _cars(self, view: View) -> list[marks.Mark]:
+        body = self._problem.car.body
         poses = [tuple(float(row[0, n]) for row in view.state[:4]) for n in range(len(self._names))]
         return [
-            mark
-            for n, (x, y, c, s) in enumerate(poses)
-            for mark in marks.of_car(n, self._body, x, y, half(c, s))
+            mark for n, (x, y, c, s) in enumerate(poses) for mark in marks.of_car(n, body, x, y, half(c, s))
         ]
 
     def _put(self, topic: str, kind: Any, make: Callable[[], Any], *, latched: bool = False) -> None:
