@@ -36,7 +36,7 @@ tools: .venv/.installed-dev
 	@scripts/crosscheck-tools.sh
 	@scripts/gazebo.sh
 
-test-all: export PYTEST_TIMEOUT := 86400
+test-all: export PYTEST_ADDOPTS := -o faulthandler_timeout=86400
 test-all: test test-tools ## all tests, then those of which the suite runs a part, in full: hours
 	DUBINS_TRAFFIC_TRIALS_2016=50 $(BIN)/python -m pytest tests/integration/test_ros1_2016.py
 	DUBINS_TRAFFIC_TRIALS_ROS2=50 $(BIN)/python -m pytest tests/integration/test_rclpy.py

@@ -33,8 +33,29 @@ def test_programs_that_tests_start_hear_ctrl_c_wherever_the_tests_were_begun() -
         assert done.stdout == found
 
 
-def test_every_test_has_a_limit_at_which_it_is_ended(pytestconfig: pytest.Config) -> None:
-    assert 0 < float(pytestconfig.getini("timeout")) <= 3600
+HANGS = """import ctypes, subprocess, sys
+
+def test_holds_pythons_lock():
+    ctypes.PyDLL(None).sleep(3600)
+
+def test_waits_for_a_program():
+    with subprocess.Popen([sys.executable, "-c", "import sys; sys.stdin.read()"], stdin=subprocess.PIPE) as program:
+        program.wait()
+"""
+
+
+@pytest.mark.parametrize("name", ["test_holds_pythons_lock", "test_waits_for_a_program"])
+def test_a_test_that_hangs_is_ended_whatever_it_waits_for(
+    name: str, tmp_path: Path, pytestconfig: pytest.Config
+) -> None:
+    assert 0 < float(pytestconfig.getini("faulthandler_timeout")) <= 1800
+    (tmp_path / "test_hangs.py").write_text(HANGS)
+    command = [sys.executable, "-m", "pytest", "-c", ROOT / "pyproject.toml", "--rootdir", tmp_path]
+    command += ["-o", "faulthandler_timeout=1", f"{tmp_path / 'test_hangs.py'}::{name}"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert "Timeout" in done.stderr
+    assert name in done.stderr
 
 
 PYTHON = """#!/bin/sh

@@ -1,5 +1,3 @@
-import itertools
-import os
 from typing import Any
 
 import pytest
@@ -11,9 +9,8 @@ from dubins_traffic.transports.ros2 import messages as m
 from dubins_traffic.transports.ros2.graph import Graph
 from dubins_traffic.transports.ros2.transport import Ros2
 from tests.conformance.ros_peer import Odometry, RosConformance, RosPeer
+from tests.ports import kept_domain
 from tests.recordings import make_instance
-
-DOMAINS = itertools.count(30 + 20 * (os.getpid() % 10))
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -54,7 +51,7 @@ class Ros2Peer(RosPeer):
 
 class TestRos2(RosConformance):
     def make(self) -> Ros2:
-        return Ros2(next(DOMAINS), clock=True)
+        return Ros2(kept_domain(), clock=True)
 
     def connect(self, transport: Ros2, car: str) -> Any:
         return Ros2Peer(transport, car)

@@ -1,4 +1,5 @@
 import math
+import signal
 import time
 from dataclasses import replace
 
@@ -142,6 +143,13 @@ def test_a_late_controller_is_ended_by_its_deadline(sleep) -> None:
     result = run_trial(instance(), Straight(sleeps=sleep), deadline=0.02)
     assert result.ending.end is End.DEADLINE
     assert not result.wall.reproducible
+
+
+def test_a_deadline_leaves_the_alarm_that_somebody_else_has_set(request) -> None:
+    request.addfinalizer(lambda: signal.setitimer(signal.ITIMER_REAL, 0.0))
+    signal.setitimer(signal.ITIMER_REAL, 3600.0)
+    assert run_trial(instance(), Straight(), deadline=600.0).ending.end is End.DURATION
+    assert signal.getitimer(signal.ITIMER_REAL)[0] > 600.0
 
 
 def test_ctrl_c_ends_the_trial_as_interrupted() -> None:

@@ -198,7 +198,7 @@ def _deadline_error(deadline: float, tick: int) -> ControllerError:
 
 @contextlib.contextmanager
 def _alarm(seconds: float) -> Generator[None]:
-    """Raise _TooLateError in the body after `seconds`, where the platform and thread allow it."""
+    """Raise _TooLateError in the body after `seconds`, where platform and thread allow it; leave other alarms."""
     if threading.current_thread() is not threading.main_thread() or not hasattr(signal, "setitimer"):
         yield
         return
@@ -206,10 +206,10 @@ def _alarm(seconds: float) -> Generator[None]:
     def ring(_signal: int, _frame: FrameType | None) -> None:
         raise _TooLateError(seconds)
 
-    before = signal.signal(signal.SIGALRM, ring)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before, timer = signal.signal(signal.SIGALRM, ring), signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_REAL, *timer)
