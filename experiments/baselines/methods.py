@@ -56,4 +56,8 @@ METHODS: Final[Mapping[str, Method]] = {
         "PPO taught under the shield", str(HERE / "ppo" / "shielded.npz"),
         "the same, and the shield was there while it learned; the median of three seeds",
     ),
+    "ppo-lagrangian": Method(
+        "PPO-Lagrangian", str(HERE / "ppo" / "lagrangian.npz"),
+        "PPO with a multiplier on breaches, so that an episode costs one at most; the median of three seeds",
+    ),
 }  # fmt: skip

@@ -18,10 +18,11 @@ from experiments.baselines.failures import COMMON, SUITE
 from experiments.baselines.failures import FILE as FAILURES
 from experiments.baselines.measuring import SUITES, stored
 from experiments.baselines.methods import METHODS
+from experiments.baselines.ppo.seeds import CONFIG, TRIALS
+from experiments.baselines.ppo.seeds import FILE as SEEDS
 
 DOCS: Final = Path(__file__).resolve().parents[2] / "docs"
 PICTURE: Final = DOCS / "pictures" / "baselines.svg"
-SEEDS: Final = Path(__file__).parent / "ppo" / "seeds.json"
 WAYS: Final = {"alone": "", "shield": " + shield"}
 HEAD: Final = """\
 # Baselines
@@ -85,13 +86,14 @@ def _seeds() -> Iterator[str]:
     yield "## PPO by seed"
     yield ""
     yield (
-        "20 trials of `junction` that were not trained on; counted rounds a trial, and before the first breach. "
+        f"{TRIALS} trials of `{CONFIG}` that were not trained on; counted rounds a trial, and before the first breach. "
         f"`rules` makes {_two(known['rules'])}."
     )
     yield ""
     yield "| learned | seed | alone | under the shield |"
     yield "|---|--:|--:|--:|"
-    for kind, words in (("ppo", "without the shield"), ("shielded", "under the shield")):
+    kinds = {"ppo": "alone", "shielded": "under the shield", "lagrangian": "alone, a multiplier on breaches"}
+    for kind, words in kinds.items():
         for own in known[kind]:
             cells = [_two(own[way]) for way in ("alone", "shield")]
             yield f"| {words} | {own['seed']} | {' | '.join(cells)} |"
