@@ -18,7 +18,8 @@ from dubins_traffic.kernels.trig import advance
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.lookup import on_road
-from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.roads.packing import pack
+from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.simulators.embedded import Embedded
 
 TRIALS, CARS, TICKS, ROUNDS = 4096, 8, 30, 12

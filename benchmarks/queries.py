@@ -17,7 +17,8 @@ from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.generate import generate
 from dubins_traffic.roads.lookup import nearest_segment, nearest_vertex, on_road
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.roads.packing import pack
+from dubins_traffic.roads.table import RoadTable
 
 POINTS, ROUNDS = 200_000, 5
 HALF_WIDTH = 0.6

@@ -32,7 +32,7 @@ from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import Traffic, scratch
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.roads.table import pack_distinct
+from dubins_traffic.roads.packing import pack_distinct
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score

@@ -16,7 +16,7 @@ from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.tables import Drivers, Traffic, scratch
 from dubins_traffic.problem.instance import Problem
-from dubins_traffic.roads.table import pack_distinct
+from dubins_traffic.roads.packing import pack_distinct
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.shield.tables import egos

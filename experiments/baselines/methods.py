@@ -43,6 +43,10 @@ METHODS: Final[Mapping[str, Method]] = {
         "model predictive control", _of("mpc", "Mpc"), "tracks the lane for two seconds ahead, clear of others",
         "casadi",
     ),
+    "gr1": Method(
+        "GR(1) synthesis", _of("gr1", "Gr1"),
+        "the winning strategy of the game of cells; gives up where that has over 3,000,000 positions",
+    ),
     "cloning": Method(
         "cloned from `rules`", str(_LEARNED / "junction.npz"), "DAgger on `junction`, a network of 96 and 48"
     ),

@@ -40,7 +40,7 @@ REASONS = {
     "policies": ("choose commands", "in_flight lanes rules waypoint"),
     "problem": ("draws the instance", "configuration draw files instance kinds parts settings starts"),
     "record": ("says how a trial ended and how long it took", "header sink wall"),
-    "roads": ("say where points lie on them", "chains formats lookup network surface table"),
+    "roads": ("say where points lie on them", "chains cover formats lookup network packing table"),
     "routing": ("finds rounds through the goals", "lane_graph rounds tours"),
     "rules": (
         "label frames and find breaches",

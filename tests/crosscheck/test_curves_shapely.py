@@ -11,7 +11,7 @@ import shapely
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads import lookup
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 
 pytestmark = pytest.mark.path
 

@@ -11,7 +11,7 @@ from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.roads import lookup
 from dubins_traffic.roads.generate import generate, thinned_grid
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 
 pytestmark = pytest.mark.path
 

@@ -18,7 +18,7 @@ from dubins_traffic.cars.body import Bounds, Car, Rectangle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.kernels.trig import sincos
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.routing.lane_graph import FAR, aim_for, spread
 from tests.fleets import GRID, crowd, digest, in_lane, instance, medley, run
 

@@ -21,7 +21,7 @@ from dubins_traffic.observations.viewpoints import Viewpoints
 from dubins_traffic.policies.rules.tables import vehicles_of
 from dubins_traffic.problem.instance import EAgent, Instance
 from dubins_traffic.problem.kinds import REMOTE
-from dubins_traffic.roads.table import pack_distinct
+from dubins_traffic.roads.packing import pack_distinct
 from dubins_traffic.rules.referee import Breach, accused
 from dubins_traffic.shield.car_shields import CarShields
 from dubins_traffic.shield.filter import ShieldFilter

@@ -1,12 +1,20 @@
-"""Uniform cells: every cell that a segment passes through is named, however steep the segment is."""
+"""Uniform cells: every cell that a segment passes through is named, however steep the segment is.
+
+And whoever looks a point up gets the answer that he would get without cells.
+"""
 
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
-from dubins_traffic.roads.surface import covered
+from dubins_traffic.kernels.records import join
+from dubins_traffic.roads.cover import covered
+from dubins_traffic.roads.generate import generate
+from dubins_traffic.roads.lookup import CELL, nearest_segment, nearest_vertex, on_road
+from dubins_traffic.roads.packing import pack
 
 coordinates = st.floats(-30, 30) | st.integers(-30, 30).map(float)
 SUBNORMAL = 6.67522158e-313
@@ -25,3 +33,26 @@ def test_every_point_lies_in_a_cell_of_its_segment(
         x, y = x0 + share * (x1 - x0), y0 + share * (y1 - y0)
         for dx, dy in ((0.0, 0.0), (pad, 0.0), (-pad, 0.0), (0.0, pad), (0.0, -pad)):
             assert (int(np.floor((x + dx) / size)), int(np.floor((y + dy) / size))) in cells
+
+
+@pytest.mark.parametrize(
+    ("count", "roads", "bent"), [(2, 1, 0.0), (20, 26, 0.0), (20, 26, 0.6), (150, 210, 0.3)]
+)
+@pytest.mark.parametrize("half_width", [0.05, 0.6, 3.0])
+def test_a_point_lies_where_it_would_without_cells(
+    count: int, roads: int, bent: float, half_width: float
+) -> None:
+    network = generate(count, roads, 7, rigid_motion=True, bent=bent)
+    with_cells = pack([network], [half_width])
+    grid = join([with_cells.grid])
+    grid["nx"] = grid["pave_nx"] = 0
+    without = with_cells.replace(grid=grid)
+    random = np.random.default_rng(1)
+    far = np.ptp(network.points, axis=0) + 4.0
+    points = network.points.min(axis=0) - 2.0 + far * random.random((1500, 2))
+    ends = network.points[:, None] + random.normal(0.0, half_width, (len(network.points), 5, 2))
+    for x, y in np.concatenate([points, ends.reshape(-1, 2)]).tolist():
+        for find in (nearest_segment, nearest_vertex, on_road):
+            assert find(with_cells, 0, x, y) == find(without, 0, x, y), (find, x, y)
+    if half_width == 0.6 and count > 2:
+        assert {int(CELL.OFF), int(CELL.ON), int(CELL.MIXED)} < set(with_cells.pave.tolist())

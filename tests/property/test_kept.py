@@ -15,7 +15,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.roads.lookup import ValidCell, nearest_arm, valid_cell
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.rules.labeller import Labeller
 
 
@@ -34,14 +34,14 @@ def test_nearest_segment_and_vertex_are_the_same_in_all_of_a_patch(radius) -> No
         assert row.low_x <= x <= row.high_x
         assert row.low_y <= y <= row.high_y
         points = random.uniform((row.low_x, row.low_y), (row.high_x, row.high_y), (20, 2))
-        nearest = network.surface.nearest_segment(points)[0]
+        nearest = network.nearest_segment(points)[0]
         if row.segment < 0:
             forked += 1
             assert (network.ends[nearest] == row.vertex).any(axis=1).all()
             assert [nearest_arm(table, 0, row.vertex, *point)[0] for point in points] == nearest.tolist()
         else:
             assert (nearest == row.segment).all()
-        vertex, away = network.surface.nearest_vertex(points)
+        vertex, away = network.nearest_intersection(points)
         assert ((vertex == row.vertex) | (away > radius)).all()
     assert filled > 300
     assert forked > 50
@@ -109,7 +109,7 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
     )
     instance = draw(config, 1, 0)
     problem = instance.problem
-    surface = problem.network.surface
+    network = problem.network
     group = Group([instance], keeps_rules=True)
     labeller = Labeller([instance])
     labels = labeller.reset(group.state)
@@ -128,8 +128,8 @@ def test_labels_are_the_same_in_all_of_the_rectangle_in_which_they_are_kept() ->
                 continue
             looked += 1
             points = random.uniform(low, high, (60, 2))
-            segment, far = surface.nearest_segment(points)
-            vertex, away = surface.nearest_vertex(points)
+            segment, far = network.nearest_segment(points)
+            vertex, away = network.nearest_intersection(points)
             to_vertex = np.hypot(*(points - (row["vertex_x"], row["vertex_y"])).T) ** 2
             kept = (row["ring_low"] < to_vertex) & (to_vertex < row["ring_high"])
             offset = points - (row["from_x"], row["from_y"])

@@ -85,6 +85,7 @@ def test_generated_networks_are_what_was_asked_for(data: st.DataObject) -> None:
     seed = data.draw(st.integers(0, 2**64 - 1))
     wishes: dict[str, Any] = {"minimum_angle": angle, "w": w, "radius": radius, "reach": reach}
     network = generate(count, roads, seed, rigid_motion=True, **wishes)
+    assert RoadNetwork(network.segments, network.length, network.transform, network.shape) == network
     assert (len(network.intersections), len(network.segments)) == (count, roads)
     assert clearance_faults(network, radius, reach, w) == []
     assert network.degrees.max() <= 4

@@ -17,7 +17,7 @@ from dubins_traffic.policies.rules.tables import Traffic, scratch, vehicles_of
 from dubins_traffic.policies.safety import body_at, may_meet, travel_of
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.shield.checks import gather_close, may_touch
 from dubins_traffic.shield.tables import egos
 from dubins_traffic.simulators.embedded import Embedded

@@ -15,7 +15,7 @@ from dubins_traffic.kernels.compile import jit
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.routing.lane_graph import place_on_lane
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.runs.sources import load_record

@@ -60,7 +60,7 @@ def test_arms_are_in_the_order_in_which_roads_leave() -> None:
 
 def test_the_middle_line_of_a_lane_keeps_its_distance() -> None:
     line = BENT.lane_curve(0, -0.3, 0.001)
-    _, off = BENT.surface.lane_coordinates(0, line[1:-1])
+    _, off = BENT.lane_coordinates(0, line[1:-1])
     assert np.abs(off + 0.3).max() < 1e-9
     assert BENT.lane_curve(1, 0.3, 0.001)[::-1] == pytest.approx(line)
 

@@ -21,7 +21,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.scoring.score import Score

@@ -6,7 +6,7 @@ PROGRAM = """
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.roads import lookup
 from dubins_traffic.roads.generate import generate
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 
 table = pack([generate(12, 14, 1), generate(60, 80, 2, rigid_motion=True)], [0.6, 0.5])
 draws = Draws(7, 0, 0)

@@ -32,7 +32,8 @@ from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows, table
 from dubins_traffic.problem.kinds import ALONE, COUNTER, FREE, KEEP_RULES, NUDGED, OWN
 from dubins_traffic.protocols import Draws, Driver, Reports
-from dubins_traffic.roads.table import RoadTable, pack_distinct
+from dubins_traffic.roads.packing import pack_distinct
+from dubins_traffic.roads.table import RoadTable
 
 if TYPE_CHECKING:
     from dubins_traffic.agents.free import FreeCars

@@ -29,7 +29,7 @@ from dubins_traffic.policies.rules.tables import (
 )
 from dubins_traffic.problem.draw import cycle_lanes
 from dubins_traffic.problem.kinds import FREE, KEEP_RULES, parameters_of
-from dubins_traffic.roads.table import pack_distinct
+from dubins_traffic.roads.packing import pack_distinct
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance, Problem

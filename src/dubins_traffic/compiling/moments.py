@@ -35,9 +35,9 @@ from dubins_traffic.record import reader
 from dubins_traffic.roads.closeness import Finder
 from dubins_traffic.roads.generate import thinned_grid
 from dubins_traffic.roads.network import RoadNetwork
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.roads.room import clearances
 from dubins_traffic.roads.sketch import Sketcher
-from dubins_traffic.roads.table import pack
 from dubins_traffic.roads.weave import Weaver
 from dubins_traffic.rules.obstacles import place_obstacles
 from dubins_traffic.runs.single import run_trial

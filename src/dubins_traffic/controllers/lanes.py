@@ -22,7 +22,7 @@ from dubins_traffic.policies.lanes.policy import decide, decide_in
 from dubins_traffic.policies.lanes.turns import IMPOSSIBLE, can_pivot
 from dubins_traffic.policies.rules.tables import vehicles_of
 from dubins_traffic.problem.instance import Problem
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.routing.tours import LaneGraph, Round, find_round
 
 FOLLOW = 1.3

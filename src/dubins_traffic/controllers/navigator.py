@@ -16,7 +16,8 @@ from dubins_traffic.kernels.records import table
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_way, way_between
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.roads.lookup import lane_coordinates, lane_end_direction, lane_length
-from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.roads.packing import pack
+from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import lane_at, nearest_stage, place_on_lane
 from dubins_traffic.routing.rounds import stages
 from dubins_traffic.rules.parameters import RuleParameters

@@ -23,7 +23,8 @@ from dubins_traffic.policies.rules.tables import (
     vehicles_of,
 )
 from dubins_traffic.problem.instance import Problem
-from dubins_traffic.roads.table import RoadTable, pack
+from dubins_traffic.roads.packing import pack
+from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.routing.lane_graph import nearest_stage
 from dubins_traffic.routing.rounds import stages
 

@@ -103,7 +103,7 @@ def roads(network: RoadNetwork, width: float = WIDTH) -> list[Element]:
         Of a road, metres.
     """
     made: list[Element] = []
-    owner, first, last = network.surface.bars(SAGITTA)
+    owner, first, last = network.bars(SAGITTA)
     step = last - first
     lengths = np.sqrt((step * step).sum(axis=1))
     beyond = _beyond(owner, step / lengths[:, None], width)

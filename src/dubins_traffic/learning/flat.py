@@ -27,7 +27,7 @@ from dubins_traffic.kernels.calls import bound
 from dubins_traffic.learning.flat_kernel import write_flat
 from dubins_traffic.learning.outlook import SIZE, new_outlook
 from dubins_traffic.learning.seeking import look
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.rules.propositions import NAMES
 
 if TYPE_CHECKING:

@@ -24,8 +24,8 @@ from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.philox import Draws
 from dubins_traffic.kernels.random import DOWN, GRID, UP, block
 from dubins_traffic.problem.overlap import Point, Shape, body_shape, contains, edges, obstacle_shape, overlap
+from dubins_traffic.roads.cover import covered, pairs
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.roads.surface import covered, pairs
 
 SLACK = 1e-9
 """Added to every clearance, metres, so that rounding never makes it too small."""

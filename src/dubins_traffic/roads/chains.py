@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 from math import ceil, sqrt
-from typing import NamedTuple, cast
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.kernels.angles import angle, angles, sincos
+from dubins_traffic.kernels.angles import angle, sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
 
 Point = tuple[float, float]
@@ -221,7 +221,7 @@ class Chains:
         return self.first[s] < self.first[np.add(s, 1)]
 
     def bars(self, start: Floats, end: Floats, sagitta: float) -> Bars:
-        """Return bars for all segments, the straight ones from `start` to `end` (S, 2); see `Surface.bars`."""
+        """Return bars for all segments, the straight ones from `start` to `end` (S, 2); see `RoadNetwork.bars`."""
         straight = np.flatnonzero(~self.bends(np.arange(len(start))))
         owner, begins, stops = [straight], [start[straight]], [end[straight]]
         for s in np.unique(self.owner).tolist():
@@ -244,26 +244,6 @@ class Chains:
                 self.length[k],
             )
         return Runs(start, end, tangent, length)
-
-    def distance2(self, x: Floats, y: Floats, s: Ints) -> Floats:
-        """Return the squared distances from points (x, y) to the chains s, all (N,)."""
-        return self._nearest(x, y, s)[1]
-
-    def coordinates(self, x: Floats, y: Floats, s: Ints, back: bool = False) -> tuple[Floats, Floats]:
-        """Return (along, left) of points (x, y) on the chains s, all (N,), from their second ends if `back`: metres.
-
-        Beyond the ends of a chain its first and last line go on.
-        """
-        k, _ = self._nearest(x, y, s)
-        rx, ry = x - self.start[k, 0], y - self.start[k, 1]
-        ox, oy = x - self.centre[k, 0], y - self.centre[k, 1]
-        tx, ty, side, radius = self.tangent[k, 0], self.tangent[k, 1], self.side[k], self.radius[k]
-        swept = radius * angles(np.maximum(ox * tx + oy * ty, 0.0), side * (ox * ty - oy * tx))
-        bent = side != 0.0
-        along = cast(Floats, np.where(bent, swept, rx * tx + ry * ty))
-        along = self.rest[k] - along if back else self.base[k] + along
-        off = cast(Floats, np.where(bent, side * (radius - np.sqrt(ox * ox + oy * oy)), tx * ry - ty * rx))
-        return along, -off if back else off
 
     def places(self, s: int, along: Floats) -> tuple[Floats, Floats]:
         """Return points (N, 2) of chain s and the unit vectors (N, 2) along it, so many metres from its start."""
@@ -296,32 +276,6 @@ class Chains:
         if self.side[k] == 0.0:
             return 1
         return max(1, min(FINEST, ceil(self.length[k] / sqrt(8.0 * self.radius[k] * sagitta))))
-
-    def _nearest(self, x: Floats, y: Floats, s: Ints) -> tuple[Ints, Floats]:
-        """Return the nearest pieces of the chains s, the first of equally near ones, and squared distances, (N,)."""
-        count = self.first[s + 1] - self.first[s]
-        best, least = self.first[s].copy(), np.full(x.shape, np.inf)
-        for j in range(int(count.max(initial=0))):
-            has = np.flatnonzero(j < count)
-            k = self.first[s[has]] + j
-            square = self._piece_distance2(x[has], y[has], k)
-            nearer = square < least[has]
-            best[has[nearer]] = k[nearer]
-            least[has[nearer]] = square[nearer]
-        return best, least
-
-    def _piece_distance2(self, x: Floats, y: Floats, k: Ints) -> Floats:
-        rx, ry = x - self.start[k, 0], y - self.start[k, 1]
-        qx, qy = x - self.end[k, 0], y - self.end[k, 1]
-        ox, oy = x - self.centre[k, 0], y - self.centre[k, 1]
-        tx, ty = self.tangent[k, 0], self.tangent[k, 1]
-        bent = self.side[k] != 0.0
-        past = ox * self.end_tangent[k, 0] + oy * self.end_tangent[k, 1]
-        forth = cast(Floats, np.where(bent, ox * tx + oy * ty, rx * tx + ry * ty))
-        within = cast(npt.NDArray[np.bool_], np.where(bent, past <= 0.0, forth <= self.length[k]))
-        beside = (forth >= 0.0) & within
-        off = cast(Floats, np.where(bent, np.sqrt(ox * ox + oy * oy) - self.radius[k], tx * ry - ty * rx))
-        return np.where(beside, off * off, np.minimum(rx * rx + ry * ry, qx * qx + qy * qy))
 
 
 def pieces(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> list[tuple[Piece, ...]]:

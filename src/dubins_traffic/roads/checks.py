@@ -15,9 +15,9 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.roads.chains import Corners, Piece, Point, Segment, chain, pieces
 from dubins_traffic.roads.closeness import finder
+from dubins_traffic.roads.cover import covered, pairs
 from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.room import LARGEST_DEGREE
-from dubins_traffic.roads.surface import covered, pairs
 
 NEAR = 1e-7
 """Share of the extent of two pieces within which points are one."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import acos, pi
+from math import acos, hypot, pi
 from typing import NamedTuple, cast
 
 import numpy as np
@@ -11,9 +11,9 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.roads.chains import Bars
 from dubins_traffic.roads.closeness import ROUNDING, Finder, finder
+from dubins_traffic.roads.cover import covered, pairs
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.room import LEAST_RADIUS, SEGMENT_SLACK, Clearances, clearances
-from dubins_traffic.roads.surface import covered, pairs
 
 STRAIGHTENED = 1e-3
 """How far a curve may be from the bars that stand for it where its clearance is measured, metres."""
@@ -54,7 +54,7 @@ def tight(points: Floats, ends: Ints, least: Clearances) -> Tight:
 
 def bent_tight(network: RoadNetwork, least: Clearances) -> Tight:
     """Return the places where a network whose segments bend falls short of `least`."""
-    own = _finder(network.points, network.ends, network.surface.bars(STRAIGHTENED))
+    own = _finder(network.points, network.ends, network.bars(STRAIGHTENED))
     hub = np.concatenate([network.ends[:, 0], network.ends[:, 1]])
     step = np.concatenate([network.tangents, -network.end_tangents])
     order = np.argsort(hub, kind="stable")
@@ -129,7 +129,8 @@ def clearance_faults(
         problem = f"intersections {list(names[v])} and {list(names[other])} are too close"
         faults.append(_fault(problem, s, gap, f"at least {least.apart:.6g} m"))
     for v, s in _couples(found.beside):
-        gap = float(np.sqrt(network.surface.distance2(points[v, 0], points[v, 1], np.array(s))))
+        along, left = (float(each) for each in network.lane_coordinates(2 * s, points[v]))
+        gap = hypot(left, max(-along, along - float(network.lengths[s]), 0.0))
         problem = f"intersection {list(names[v])} is too close to the road"
         faults.append(_fault(problem, s, gap, f"at least {least.aside:.6g} m"))
     for v, first, second in found.sharp.tolist():

@@ -24,7 +24,6 @@ from dubins_traffic.roads.clearance import (
     clearance_faults,
     clearances,
 )
-from dubins_traffic.roads.formats.rnd import extent
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.sketch import Drawn, sketched
 from dubins_traffic.roads.weave import most_segments, span, woven
@@ -131,7 +130,7 @@ def random_network(
     rows = tuple(
         sorted((*moved[a], *moved[b]) if moved[a] < moved[b] else (*moved[b], *moved[a]) for a, b in roads)
     )
-    made = RoadNetwork(rows, unit, _motion(draws, rigid_motion), extent(rows))
+    made = RoadNetwork.unchecked(rows, unit, _motion(draws, rigid_motion))
     if not bent > 0.0:
         return made
     return bend_some(made, draws, bent, w=w, radius=radius, reach=reach, slack=slack)

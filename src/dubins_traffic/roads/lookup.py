@@ -1,6 +1,6 @@
-"""Where a point lies on a network, compiled: the same answers, bit for bit, as `RoadNetwork` gives.
+"""Where a point lies on a network.
 
-Functions take the table `t` of `roads.table.pack` and the number `net` of a network in it; segments, intersections and
+Functions take the table `t` of `packing.pack` and the number `net` of a network in it; segments, intersections and
 lanes are numbered within the network. Lane 2s runs along segment s, lane 2s + 1 back. Those of segments that bend take
 the rows of their pieces.
 """
@@ -8,13 +8,27 @@ the rows of their pieces.
 from __future__ import annotations
 
 from math import sqrt
+from typing import Final, NamedTuple
 
 from dubins_traffic.kernels.arrays import INFINITE
 from dubins_traffic.kernels.compile import jit, jit_inline, jit_rare
 from dubins_traffic.kernels.records import Rows, record
 from dubins_traffic.kernels.trig import angle, sincos
-from dubins_traffic.roads.surface import CELL
 from dubins_traffic.roads.table import Piece, RoadTable, Segment
+
+
+class _Cell(NamedTuple):
+    """What stands in a cell of `RoadTable.pave` in place of the number of the only segment whose road meets it."""
+
+    OFF: int = -1
+    """No point of it is on the road."""
+    ON: int = -2
+    """All are."""
+    MIXED: int = -3
+    """The roads of several segments meet it."""
+
+
+CELL: Final = _Cell()
 
 CERTAIN = 1e-6
 """What rounding can't make up, metres."""

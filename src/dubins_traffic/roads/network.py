@@ -21,13 +21,18 @@ from dubins_traffic.display import Pictured, count
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.roads.chains import Chains, Corners, Runs, Segment, sides, turned
+from dubins_traffic.kernels.records import Rows, table
+from dubins_traffic.roads.cells import with_cells
+from dubins_traffic.roads.chains import Bars, Chains, Corners, Runs, Segment, sides, turned
 from dubins_traffic.roads.checks import check
 from dubins_traffic.roads.formats import registry as formats
 from dubins_traffic.roads.formats import rnd
 from dubins_traffic.roads.formats.registry import MapFormat
 from dubins_traffic.roads.formats.rnd import write_json, write_lines
-from dubins_traffic.roads.surface import Surface
+from dubins_traffic.roads.queries import coordinates, find_segments, find_vertices, nearest
+from dubins_traffic.roads.room import LARGEST_DEGREE
+from dubins_traffic.roads.table import CellGrid, Piece, RoadTable, Vertex
+from dubins_traffic.roads.table import Segment as SegmentRow
 
 Point = tuple[float, float]
 Line = tuple[Point, Point]
@@ -179,6 +184,16 @@ class RoadNetwork(Pictured):
                 expected=f"at most {rnd.WORLD:g} metres",
             )
 
+    @classmethod
+    def unchecked(
+        cls, segments: tuple[Segment, ...], length: float, transform: tuple[float, float, float]
+    ) -> RoadNetwork:
+        """Return the network of straight `segments` that are known to form one: nothing is looked at."""
+        made, shape = object.__new__(cls), rnd.extent(segments)
+        plain = {"segments": segments, "length": length, "transform": transform, "shape": shape}
+        vars(made).update(plain, extra={}, corners=())
+        return made
+
     def __repr__(self) -> str:
         return f"<RoadNetwork {self.summary}>"
 
@@ -327,9 +342,12 @@ class RoadNetwork(Pictured):
 
     def successors(self, lane: int) -> tuple[int, ...]:
         """Return the lanes that may be taken at the end of `lane`; turning round only at a dead end."""
-        out = self._arms[self.lane_ends(lane)[1]]
-        back = lane ^ 1
-        return tuple(other for other in out if other != back) or (back,)
+        return self._successors[lane]
+
+    @cached_property
+    def _successors(self) -> list[tuple[int, ...]]:
+        out = [self._arms[v] for v in self.ends[:, ::-1].ravel().tolist()]
+        return [tuple([other for other in own if other != k ^ 1]) or (k ^ 1,) for k, own in enumerate(out)]
 
     @cached_property
     def _lane_graph(self) -> tuple[list[int], list[float], list[list[int]]]:
@@ -357,27 +375,81 @@ class RoadNetwork(Pictured):
         return routes
 
     @cached_property
-    def surface(self) -> Surface:
-        """The segments and intersections in the world, with look-up by place."""
-        return Surface(
-            self.points, self.ends, self.tangents, self.lengths, None if self.is_straight else self.chains
+    def table(self) -> RoadTable:
+        """The network as kernels read it (never to be written to), without a width of its roads."""
+        none = np.zeros(0, dtype=np.int64)
+        return with_cells(
+            RoadTable(
+                half_width=np.zeros(1),
+                seg_off=np.array([0, len(self.segments)]),
+                segment=self._segment_rows(),
+                piece=table(Piece, 0) if self.is_straight else self._piece_rows(),
+                ends=self.ends.copy(),
+                vert_off=np.array([0, len(self.points)]),
+                vertex=self._vertex_rows(),
+                arms=np.array([own + (-1,) * (LARGEST_DEGREE - len(own)) for own in self._arms]),
+                degree=self.degrees.copy(),
+                grid=table(CellGrid, 1),
+                **dict.fromkeys(("seg_start", "seg_item", "vert_start", "vert_item", "pave"), none),
+            )
         )
+
+    def _segment_rows(self) -> Rows[SegmentRow]:
+        rows = table(SegmentRow, len(self.segments))
+        rows["x"], rows["y"] = self.points[self.ends[:, 0]].T
+        rows["tx"], rows["ty"] = self.tangents.T
+        rows["length"] = self.lengths
+        rows["end_x"], rows["end_y"] = self.points[self.ends[:, 1]].T
+        rows["first"], rows["second"] = self.ends.T
+        rows["end_tx"], rows["end_ty"] = self.end_tangents.T
+        rows["piece"] = rows["last"] = -1
+        if not self.is_straight:
+            first = self.chains.first
+            rows["piece"] = np.where(self.bent, first[:-1], -1)
+            rows["last"] = np.where(self.bent, first[1:] - 1, -1)
+        return rows
+
+    def _piece_rows(self) -> Rows[Piece]:
+        chains = self.chains
+        rows = table(Piece, len(chains.owner))
+        rows["x"], rows["y"] = chains.start.T
+        rows["tx"], rows["ty"] = chains.tangent.T
+        rows["end_x"], rows["end_y"] = chains.end.T
+        rows["end_tx"], rows["end_ty"] = chains.end_tangent.T
+        rows["cx"], rows["cy"] = chains.centre.T
+        rows["length"], rows["base"], rows["radius"] = chains.length, chains.base, chains.radius
+        rows["rest"], rows["side"] = chains.rest, chains.side
+        return rows
+
+    def _vertex_rows(self) -> Rows[Vertex]:
+        rows = table(Vertex, len(self.points))
+        rows["x"], rows["y"] = self.points.T
+        return rows
 
     def nearest_segment(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return number of and distance to the nearest segment of points (..., 2); ties: the lower number."""
-        return self.surface.nearest_segment(points)
+        number, square = nearest(find_segments, self.table, points)
+        return number, np.sqrt(square)
 
     def nearest_intersection(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return number of and distance to the nearest intersection of points (..., 2); ties: the lower number."""
-        return self.surface.nearest_vertex(points)
+        number, square = nearest(find_vertices, self.table, points)
+        return number, np.sqrt(square)
 
     def on_road(self, points: npt.ArrayLike, half_width: float) -> npt.NDArray[np.bool_]:
         """Whether points (..., 2) lie within `half_width` metres of a segment (its ends capped by discs)."""
-        return self.surface.on_road(points, half_width)
+        return nearest(find_segments, self.table, points)[1] <= half_width * half_width
 
     def lane_coordinates(self, lane: int, points: npt.ArrayLike) -> tuple[Floats, Floats]:
         """Return (s, l) of points (..., 2): metres along a lane from its start, and left of the centre line."""
-        return self.surface.lane_coordinates(lane, points)
+        return coordinates(self.table, lane, points)
+
+    def bars(self, sagitta: float) -> Bars:
+        """Return straight bars that stand for the segments: chains leave them by at most `sagitta` metres."""
+        start, end = self.points[self.ends[:, 0]], self.points[self.ends[:, 1]]
+        if self.is_straight:
+            return Bars(np.arange(len(start)), start, end)
+        return self.chains.bars(start, end, sagitta)
 
     @property
     def is_straight(self) -> bool:

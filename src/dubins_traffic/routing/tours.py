@@ -10,9 +10,9 @@ import heapq
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
+from itertools import chain, pairwise
 from math import inf
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
@@ -30,6 +30,7 @@ MOST_KEPT, FEWEST_KEPT = 1 << 19, 8
 """About how many numbers are cached of the rounds found on a network, and the least number of rounds."""
 
 TurnCost = Callable[[int, int], float]
+T = TypeVar("T")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,33 +51,38 @@ class LaneGraph:
     """
 
     def __init__(self, network: RoadNetwork, turn_cost: TurnCost | None = None) -> None:
-        lengths: list[float] = network.lengths.tolist()
-        self.count = network.lanes
-        self.length = [lengths[lane >> 1] for lane in range(self.count)]
-        self.end = [network.lane_ends(lane)[1] for lane in range(self.count)]
-        self.after: list[list[tuple[int, float]]] = []
-        self.before: list[list[tuple[int, float]]] = [[] for _ in range(self.count)]
-        for lane in range(self.count):
-            steps: list[tuple[int, float]] = []
-            for other in network.successors(lane):
-                turn = turn_cost(lane, other) if turn_cost is not None else 0.0
-                cost = max(0.0, self.length[other] + turn)
-                steps.append((other, cost))
-                self.before[other].append((lane, cost))
-            self.after.append(steps)
-        self.into: list[list[int]] = [[] for _ in range(len(network.intersections))]
-        for lane, v in enumerate(self.end):
-            self.into[v].append(lane)
+        count, end = network.lanes, network.ends[:, ::-1].ravel()
+        follows = [network.successors(lane) for lane in range(count)]
+        length = np.repeat(network.lengths, 2)
+        lane = np.repeat(np.arange(count), [len(own) for own in follows])
+        other = np.fromiter(chain.from_iterable(follows), dtype=np.int64)
+        steps = zip(lane.tolist(), other.tolist(), strict=True)
+        turn = 0.0 if turn_cost is None else np.array([turn_cost(*step) for step in steps])
+        cost = np.maximum(0.0, length[other] + turn)
+        back, into = np.argsort(other, kind="stable"), np.argsort(end, kind="stable")
+        self.tables = LaneTables(
+            *(_offsets(lane, count), other, cost),
+            *(_offsets(other, count), lane[back], cost[back]),
+            *(_offsets(end, len(network.intersections)), into),
+        )
+        self.count = count
+        self.length: list[float] = length.tolist()
+        self.end: list[int] = end.tolist()
+        self.into: list[list[int]] = _parts(into.tolist(), self.tables.into_off)
         self.rounds: dict[tuple[int, ...], Round | None] = {}
         self.stages: dict[Round, tuple[Ints, Floats]] = {}
 
     @cached_property
-    def tables(self) -> LaneTables:
-        """The graph as arrays."""
-        after = _offsets(self.after), *_columns(self.after)
-        before = _offsets(self.before), *_columns(self.before)
-        into = np.fromiter(chain.from_iterable(self.into), dtype=np.int64)
-        return LaneTables(*after, *before, _offsets(self.into), into)
+    def after(self) -> list[list[tuple[int, float]]]:
+        """The lanes that may follow each lane, with what the step costs."""
+        own = self.tables
+        return _parts(list(zip(own.after.tolist(), own.after_cost.tolist(), strict=True)), own.after_off)
+
+    @cached_property
+    def before(self) -> list[list[tuple[int, float]]]:
+        """The lanes that each lane may follow, with what the step costs."""
+        own = self.tables
+        return _parts(list(zip(own.before.tolist(), own.before_cost.tolist(), strict=True)), own.before_off)
 
     def metres_to(self, target: int) -> Floats:
         """Return the result of `distances` without penalties, as an array."""
@@ -145,14 +151,12 @@ def lane_graph(network: RoadNetwork) -> LaneGraph:
     return graph
 
 
-def _offsets(rows: Sequence[Sequence[object]]) -> Ints:
-    return np.cumsum([0, *map(len, rows)]).astype(np.int64)
+def _offsets(owner: Ints, count: int) -> Ints:
+    return np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=count))])
 
 
-def _columns(rows: Sequence[Sequence[tuple[int, float]]]) -> tuple[Ints, Floats]:
-    flat = list(chain.from_iterable(rows))
-    lanes = np.array([lane for lane, _ in flat], dtype=np.int64)
-    return lanes, np.array([cost for _, cost in flat], dtype=np.float64)
+def _parts(flat: list[T], off: Ints) -> list[list[T]]:
+    return [flat[begin:end] for begin, end in pairwise(off.tolist())]
 
 
 def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:

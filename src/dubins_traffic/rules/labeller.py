@@ -12,7 +12,8 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Rows
 from dubins_traffic.roads.clearance import clearance_faults
-from dubins_traffic.roads.table import RoadTable, pack_distinct
+from dubins_traffic.roads.packing import pack_distinct
+from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.fault import with_fault
 from dubins_traffic.rules.frame import label_frame
 from dubins_traffic.rules.judged import JudgedInstance, JudgedProblem, distinct_problems

@@ -16,7 +16,7 @@ from dubins_traffic.kernels.records import table
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.problem.preconditions import check_demands
 from dubins_traffic.record.sink import Ending
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.rules.breach_log import EntryMargins
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import NOTHING, Referee

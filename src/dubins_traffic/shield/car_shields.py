@@ -19,7 +19,7 @@ from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.tables import Traffic, scratch
-from dubins_traffic.roads.table import pack_distinct
+from dubins_traffic.roads.packing import pack_distinct
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import REASON, REASONS, Overtakes, check_overtakes, egos, shield_tables
 

@@ -12,7 +12,7 @@ from dubins_traffic.kernels.calls import bound
 from dubins_traffic.policies.in_flight import InFlight
 from dubins_traffic.policies.rules.fitness import check_fit
 from dubins_traffic.policies.rules.tables import Traffic, scratch
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.shield.checks import bounded
 from dubins_traffic.shield.nearest_command import shield
 from dubins_traffic.shield.tables import (

@@ -19,7 +19,7 @@ from dubins_traffic.policies.rules.policy import decide
 from dubins_traffic.policies.rules.room import MARGIN
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Driver, Drivers, Traffic, scratch
 from dubins_traffic.problem.kinds import COUNTER
-from dubins_traffic.roads.table import pack
+from dubins_traffic.roads.packing import pack
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.synthesis.assumption import Assumption, Order

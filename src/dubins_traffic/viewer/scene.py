@@ -36,7 +36,7 @@ class Extent(NamedTuple):
 
 def road_lines(network: RoadNetwork) -> Floats:
     """Return lines that stand for the segments, (K, 2, 2) metres: one for each that is straight, chords of curves."""
-    _, start, end = network.surface.bars(SAGITTA)
+    _, start, end = network.bars(SAGITTA)
     return np.stack([start, end], axis=1)
 
 
@@ -48,7 +48,7 @@ def centre_lines(network: RoadNetwork, half_width: float) -> Floats:
     ends = network.ends
     trim = np.where(network.degrees[ends] > 1, half_width, 0.0)
     trim = np.minimum(trim, 0.35 * network.lengths[:, None])
-    owner, start, stop = network.surface.bars(SAGITTA)
+    owner, start, stop = network.bars(SAGITTA)
     first = np.flatnonzero(np.diff(owner, prepend=-1))
     last = np.flatnonzero(np.diff(owner, append=-1))
     s = owner[first]

@@ -1,0 +1,1 @@
+"""A known method as a controller; README.md beside says what it assumes."""
