@@ -28,6 +28,8 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.instance import Instance
 
 ENVS, AGENTS, DURATION, ROUNDS, SKIP, STEPS = 64, 7, 20, 7, 4, 300
+TOWNS, TOWN_STEPS = 512, 1800
+"""Environments, and steps of a fifth of a second, in which each of them begins two episodes or three."""
 HIGHWAY = peers.Peer("highway-env", "highway", "drivers, observed every tick")
 
 
@@ -60,6 +62,7 @@ def measure() -> list[Row]:
             True,
         ),
         _several(document),
+        *_towns(),
         Row("a reset, of all environments at once", f"{1e3 * reset:.3f} ms", "<= 0.2 ms", reset <= 2e-4),
         _against(highway.what, cars * ticks / every, highway.per_second, 2000.0, "car-steps/s"),
     ]
@@ -87,6 +90,34 @@ def _several(document: dict[str, Any]) -> Row:
         ">= 0.4 of those of one",
         every / one >= 0.4,
     )
+
+
+def _towns() -> list[Row]:
+    """Return the rows that compare environments that draw a network for each episode with those that have 200."""
+    drawn, kept = _steps_of_towns(None), _steps_of_towns(200)
+    longest, slower = max(drawn) / float(np.median(drawn)), sum(drawn) / sum(kept)
+    return [
+        Row(
+            f"{TOWNS} environments of `town`, a road network each episode",
+            f"{TOWNS * TOWN_STEPS / sum(drawn):.2e} steps/s; {slower:.2f} of the time with 200 networks",
+            "<= 1.3 of that",
+            slower <= 1.3,
+        ),
+        Row("the same: the longest step", f"{longest:.0f} times the median", "<= 20", longest <= 20.0),
+    ]
+
+
+def _steps_of_towns(levels: int | None) -> list[float]:
+    """Return the seconds of each step of some environments of `town`, of which no others are there."""
+    env = TrafficVectorEnv(TOWNS, "town", frame_skip=6, staggered=True, levels=levels)
+    actions = np.random.default_rng(1).uniform(-1.0, 1.0, (8, TOWNS, 2))
+    env.reset(seed=1)
+    seconds: list[float] = []
+    for k in range(TOWN_STEPS):
+        began = process_time()
+        env.step(actions[k % 8])
+        seconds.append(process_time() - began)
+    return seconds
 
 
 def _against(what: str, ours: float, rate: float | None, least: float, unit: str = "steps/s") -> Row:

@@ -23,6 +23,8 @@ from experiments.baselines.ppo.seeds import FILE as SEEDS
 
 DOCS: Final = Path(__file__).resolve().parents[2] / "docs"
 PICTURE: Final = DOCS / "pictures" / "baselines.svg"
+MORE_COLOURS: Final = ("black", "navy", "maroon", "darkgreen", "gold")
+"""After the ten of Matplotlib."""
 WAYS: Final = {"alone": "", "shield": " + shield"}
 HEAD: Final = """\
 # Baselines
@@ -216,7 +218,7 @@ def draw() -> None:
                 )
                 for way in WAYS
             ]
-            colour = f"C{k}" if k < 10 else "black"
+            colour = f"C{k}" if k < 10 else MORE_COLOURS[k - 10]
             field.plot(*zip(*points, strict=True), color=colour, linewidth=0.6, alpha=0.5)
             field.plot(
                 *points[0], "o", color=colour, markersize=5, label=METHODS[name].title.replace("`", "")

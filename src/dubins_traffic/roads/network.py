@@ -22,7 +22,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, table
-from dubins_traffic.roads.cells import with_cells
+from dubins_traffic.roads.cells import with_cells, with_pave
 from dubins_traffic.roads.chains import Bars, Chains, Corners, Runs, Segment, sides, turned
 from dubins_traffic.roads.checks import check
 from dubins_traffic.roads.formats import registry as formats
@@ -374,24 +374,37 @@ class RoadNetwork(Pictured):
             routes = self._routes[v] = shortest(v, *self._lane_graph)
         return routes
 
+    def table(self, half_width: float | None = None) -> RoadTable:
+        """Return the network as kernels read it, its roads `half_width` metres to either side; by default of any width.
+
+        It is kept for next time, and never to be written to.
+        """
+        kept = self._tables
+        if half_width is None:
+            return next(iter(kept.values()), None) or kept.setdefault(None, with_cells(self._bare_table()))
+        if half_width not in kept:
+            kept[half_width] = with_pave(self.table(), half_width)
+            kept.pop(None, None)
+        return kept[half_width]
+
     @cached_property
-    def table(self) -> RoadTable:
-        """The network as kernels read it (never to be written to), without a width of its roads."""
+    def _tables(self) -> dict[float | None, RoadTable]:
+        return {}
+
+    def _bare_table(self) -> RoadTable:
         none = np.zeros(0, dtype=np.int64)
-        return with_cells(
-            RoadTable(
-                half_width=np.zeros(1),
-                seg_off=np.array([0, len(self.segments)]),
-                segment=self._segment_rows(),
-                piece=table(Piece, 0) if self.is_straight else self._piece_rows(),
-                ends=self.ends.copy(),
-                vert_off=np.array([0, len(self.points)]),
-                vertex=self._vertex_rows(),
-                arms=np.array([own + (-1,) * (LARGEST_DEGREE - len(own)) for own in self._arms]),
-                degree=self.degrees.copy(),
-                grid=table(CellGrid, 1),
-                **dict.fromkeys(("seg_start", "seg_item", "vert_start", "vert_item", "pave"), none),
-            )
+        return RoadTable(
+            half_width=np.zeros(1),
+            seg_off=np.array([0, len(self.segments)]),
+            segment=self._segment_rows(),
+            piece=table(Piece, 0) if self.is_straight else self._piece_rows(),
+            ends=self.ends.copy(),
+            vert_off=np.array([0, len(self.points)]),
+            vertex=self._vertex_rows(),
+            arms=np.array([own + (-1,) * (LARGEST_DEGREE - len(own)) for own in self._arms]),
+            degree=self.degrees.copy(),
+            grid=table(CellGrid, 1),
+            **dict.fromkeys(("seg_start", "seg_item", "vert_start", "vert_item", "pave"), none),
         )
 
     def _segment_rows(self) -> Rows[SegmentRow]:
@@ -428,21 +441,21 @@ class RoadNetwork(Pictured):
 
     def nearest_segment(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return number of and distance to the nearest segment of points (..., 2); ties: the lower number."""
-        number, square = nearest(find_segments, self.table, points)
+        number, square = nearest(find_segments, self.table(), points)
         return number, np.sqrt(square)
 
     def nearest_intersection(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return number of and distance to the nearest intersection of points (..., 2); ties: the lower number."""
-        number, square = nearest(find_vertices, self.table, points)
+        number, square = nearest(find_vertices, self.table(), points)
         return number, np.sqrt(square)
 
     def on_road(self, points: npt.ArrayLike, half_width: float) -> npt.NDArray[np.bool_]:
         """Whether points (..., 2) lie within `half_width` metres of a segment (its ends capped by discs)."""
-        return nearest(find_segments, self.table, points)[1] <= half_width * half_width
+        return nearest(find_segments, self.table(), points)[1] <= half_width * half_width
 
     def lane_coordinates(self, lane: int, points: npt.ArrayLike) -> tuple[Floats, Floats]:
         """Return (s, l) of points (..., 2): metres along a lane from its start, and left of the centre line."""
-        return coordinates(self.table, lane, points)
+        return coordinates(self.table(), lane, points)
 
     def bars(self, sagitta: float) -> Bars:
         """Return straight bars that stand for the segments: chains leave them by at most `sagitta` metres."""

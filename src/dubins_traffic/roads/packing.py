@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +10,6 @@ import numpy.typing as npt
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
 from dubins_traffic.kernels.records import Rows, join
-from dubins_traffic.roads.cells import with_pave
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.roads.table import CellGrid, RoadTable, Segment
 
@@ -43,7 +41,7 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
     if not networks or len(networks) != len(half_widths):
         expected = "one half width for each of at least one network"
         raise InputError("can't pack networks", value=(len(networks), len(half_widths)), expected=expected)
-    tables = [_table(network, width) for network, width in zip(networks, half_widths, strict=True)]
+    tables = [network.table(width) for network, width in zip(networks, half_widths, strict=True)]
     if len(tables) == 1:
         return tables[0]
     plain = {
@@ -62,14 +60,6 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
         seg_start=_starts([own.seg_start for own in tables]),
         vert_start=_starts([own.vert_start for own in tables]),
     )
-
-
-def _table(network: RoadNetwork, half_width: float) -> RoadTable:
-    """Return the table of one network (kept for next time, never to be written to)."""
-    key = RoadTable, half_width
-    if key not in network.known:
-        network.known[key] = with_pave(network.table, half_width)
-    return cast(RoadTable, network.known[key])
 
 
 def _joined_segments(tables: Sequence[RoadTable]) -> Rows[Segment]:

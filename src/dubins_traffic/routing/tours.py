@@ -68,9 +68,13 @@ class LaneGraph:
         self.count = count
         self.length: list[float] = length.tolist()
         self.end: list[int] = end.tolist()
-        self.into: list[list[int]] = _parts(into.tolist(), self.tables.into_off)
         self.rounds: dict[tuple[int, ...], Round | None] = {}
         self.stages: dict[Round, tuple[Ints, Floats]] = {}
+
+    @cached_property
+    def into(self) -> list[list[int]]:
+        """The lanes that end in each intersection."""
+        return _parts(self.tables.into.tolist(), self.tables.into_off)
 
     @cached_property
     def after(self) -> list[list[tuple[int, float]]]:
