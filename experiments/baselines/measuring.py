@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any, Final
@@ -23,25 +22,18 @@ from experiments.stored import code
 RESULTS: Final = Path(__file__).parent / "results"
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """The part of a suite that is run: the first trials of every so many of its combinations, or all its cases."""
-
-    every: int
-    trials: int
-
-
-SUITES: Final = {"icra2016": Part(1, 10), "rules-2026": Part(1, 2), "adversary-2026": Part(1, 1)}
+SUITES: Final = {"icra2016": 10, "rules-2026": 2, "adversary-2026": 1}
+"""The suites, with how many trials of each of their combinations are run; all cases of one that has cases."""
 SHIELD: Final = "+shield"
 
 
 def instances_of(name: str) -> list[Instance]:
     """Return the trials of a suite that are run, in order."""
-    suite, part = load_suite(name), SUITES[name]
+    suite, trials = load_suite(name), SUITES[name]
     if suite.model.cases is not None:
         return list(case_instances(suite.model.cases).values())
-    cells = suite.campaign(["rules"], part.trials).cells[:: part.every]
-    return [draw(cell.settled, cell.seed, trial) for cell in cells for trial in range(part.trials)]
+    cells = suite.campaign(["rules"], trials).cells
+    return [draw(cell.settled, cell.seed, trial) for cell in cells for trial in range(trials)]
 
 
 def columns(found: Sequence[Outcome]) -> dict[str, list[Any]]:

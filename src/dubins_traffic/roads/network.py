@@ -29,7 +29,7 @@ from dubins_traffic.roads.formats import registry as formats
 from dubins_traffic.roads.formats import rnd
 from dubins_traffic.roads.formats.registry import MapFormat
 from dubins_traffic.roads.formats.rnd import write_json, write_lines
-from dubins_traffic.roads.queries import coordinates, find_segments, find_vertices, nearest
+from dubins_traffic.roads.queries import coordinates, nearest
 from dubins_traffic.roads.room import LARGEST_DEGREE
 from dubins_traffic.roads.table import CellGrid, Piece, RoadTable, Vertex
 from dubins_traffic.roads.table import Segment as SegmentRow
@@ -374,26 +374,22 @@ class RoadNetwork(Pictured):
             routes = self._routes[v] = shortest(v, *self._lane_graph)
         return routes
 
-    def table(self, half_width: float | None = None) -> RoadTable:
-        """Return the network as kernels read it, its roads `half_width` metres to either side; by default of any width.
-
-        It is kept for next time, and never to be written to.
-        """
-        kept = self._tables
-        if half_width is None:
-            return next(iter(kept.values()), None) or kept.setdefault(None, with_cells(self._bare_table()))
-        if half_width not in kept:
-            kept[half_width] = with_pave(self.table(), half_width)
-            kept.pop(None, None)
-        return kept[half_width]
+    def table(self, half_width: float) -> RoadTable:
+        """Return the network as kernels read it, its roads `half_width` metres to either side (kept for next time)."""
+        found = self._tables.get(half_width)
+        if found is None:
+            found = self._tables[half_width] = with_pave(self.bare_table, half_width)
+        return found
 
     @cached_property
-    def _tables(self) -> dict[float | None, RoadTable]:
+    def _tables(self) -> dict[float, RoadTable]:
         return {}
 
-    def _bare_table(self) -> RoadTable:
+    @cached_property
+    def bare_table(self) -> RoadTable:
+        """The network as kernels read it, but for the width of its roads (never to be written to)."""
         none = np.zeros(0, dtype=np.int64)
-        return RoadTable(
+        bare = RoadTable(
             half_width=np.zeros(1),
             seg_off=np.array([0, len(self.segments)]),
             segment=self._segment_rows(),
@@ -406,6 +402,7 @@ class RoadNetwork(Pictured):
             grid=table(CellGrid, 1),
             **dict.fromkeys(("seg_start", "seg_item", "vert_start", "vert_item", "pave"), none),
         )
+        return with_cells(bare)
 
     def _segment_rows(self) -> Rows[SegmentRow]:
         rows = table(SegmentRow, len(self.segments))
@@ -441,21 +438,21 @@ class RoadNetwork(Pictured):
 
     def nearest_segment(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return number of and distance to the nearest segment of points (..., 2); ties: the lower number."""
-        number, square = nearest(find_segments, self.table(), points)
+        number, square = nearest(self.bare_table, points)
         return number, np.sqrt(square)
 
     def nearest_intersection(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return number of and distance to the nearest intersection of points (..., 2); ties: the lower number."""
-        number, square = nearest(find_vertices, self.table(), points)
+        number, square = nearest(self.bare_table, points, vertices=True)
         return number, np.sqrt(square)
 
     def on_road(self, points: npt.ArrayLike, half_width: float) -> npt.NDArray[np.bool_]:
         """Whether points (..., 2) lie within `half_width` metres of a segment (its ends capped by discs)."""
-        return nearest(find_segments, self.table(), points)[1] <= half_width * half_width
+        return nearest(self.bare_table, points)[1] <= half_width * half_width
 
     def lane_coordinates(self, lane: int, points: npt.ArrayLike) -> tuple[Floats, Floats]:
         """Return (s, l) of points (..., 2): metres along a lane from its start, and left of the centre line."""
-        return coordinates(self.table(), lane, points)
+        return coordinates(self.bare_table, lane, points)
 
     def bars(self, sagitta: float) -> Bars:
         """Return straight bars that stand for the segments: chains leave them by at most `sagitta` metres."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 import numpy.typing as npt
 
@@ -12,15 +10,13 @@ from dubins_traffic.kernels.compile import jit
 from dubins_traffic.roads.lookup import lane_coordinates, nearest_segment, nearest_vertex
 from dubins_traffic.roads.table import RoadTable
 
-Find = Callable[[RoadTable, Floats, Ints, Floats], None]
 
-
-def nearest(find: Find, t: RoadTable, points: npt.ArrayLike) -> tuple[Ints, Floats]:
-    """Return the number of what `find` finds nearest to points (..., 2), and squared distances; ties: the lower."""
+def nearest(t: RoadTable, points: npt.ArrayLike, *, vertices: bool = False) -> tuple[Ints, Floats]:
+    """Return number of and squared distance to the nearest segment, or vertex, of points (..., 2); ties: the lower."""
     points = np.asarray(points, dtype=np.float64)
     flat = np.ascontiguousarray(points.reshape(-1, 2))
     number, square = np.empty(len(flat), dtype=np.int64), np.empty(len(flat))
-    find(t, flat, number, square)
+    put_nearest(t, vertices, flat, number, square)
     return number.reshape(points.shape[:-1]), square.reshape(points.shape[:-1])
 
 
@@ -33,41 +29,25 @@ def coordinates(t: RoadTable, lane: int, points: npt.ArrayLike) -> tuple[Floats,
 
 
 @jit
-def find_segments(t: RoadTable, points: Floats, number: Ints, square: Floats) -> None:
-    """Find the nearest segments of the first network.
+def put_nearest(t: RoadTable, vertices: bool, points: Floats, number: Ints, square: Floats) -> None:
+    """Find what is nearest to points in the first network.
 
     Parameters
     ----------
     t : RoadTable
         The roads.
+    vertices : bool
+        Whether intersections are sought, else segments.
     points : (N, 2) float64
         Points, m.
     number : (N,) int64
-        Set to the numbers of the segments.
+        Set to the numbers of what is nearest.
     square : (N,) float64
         Set to the squared distances, m^2.
     """
     for k in range(points.shape[0]):
-        number[k], square[k] = nearest_segment(t, 0, points[k, 0], points[k, 1])
-
-
-@jit
-def find_vertices(t: RoadTable, points: Floats, number: Ints, square: Floats) -> None:
-    """Find the nearest intersections of the first network.
-
-    Parameters
-    ----------
-    t : RoadTable
-        The roads.
-    points : (N, 2) float64
-        Points, m.
-    number : (N,) int64
-        Set to the numbers of the intersections.
-    square : (N,) float64
-        Set to the squared distances, m^2.
-    """
-    for k in range(points.shape[0]):
-        number[k], square[k] = nearest_vertex(t, 0, points[k, 0], points[k, 1])
+        x, y = points[k, 0], points[k, 1]
+        number[k], square[k] = nearest_vertex(t, 0, x, y) if vertices else nearest_segment(t, 0, x, y)
 
 
 @jit
