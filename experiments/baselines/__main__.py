@@ -31,8 +31,9 @@ def main() -> int:
     if asked.record:
         suite, trial, file = asked.record
         (method,) = asked.methods
-        spec = METHODS[method].controller + (SHIELD if asked.shield else "")
-        result = run_trial(instances_of(suite)[int(trial)], load(spec), name=spec, record=file)
+        instance = instances_of(suite)[int(trial)]
+        spec = METHODS[method].drives(instance) + (SHIELD if asked.shield else "")
+        result = run_trial(instance, load(spec), name=spec, record=file)
         print(result.score.summary)
         return 0
     for method in asked.methods:

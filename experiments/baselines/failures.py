@@ -35,8 +35,9 @@ def typical(columns: dict[str, list[Any]]) -> tuple[str, int] | None:
 
 def seen_again(method: str, rule: str, trial: int, file: Path) -> tuple[Record, Any, str]:
     """Run a trial again; return its record, its first breach of a rule, and the sentence on it."""
-    spec = METHODS[method].controller
-    result = run_trial(instances_of(SUITE)[trial], load(spec), name=spec, record=file)
+    instance = instances_of(SUITE)[trial]
+    spec = METHODS[method].drives(instance)
+    result = run_trial(instance, load(spec), name=spec, record=file)
     verdict = result.score.verdict
     assert verdict is not None
     breach = next(own for own in verdict.violations if own.car == EGO_NAME and own.rule == rule)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from datetime import UTC, datetime
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
@@ -60,8 +61,11 @@ def run(
     instances = instances_of(suite)
     chosen = [instances[k] for k in (range(len(instances)) if some is None else some)]
     places = {id(own): k for k, own in enumerate(chosen)}
-    spec = METHODS[method].controller + (SHIELD if shield else "")
-    found = sorted(outcomes(chosen, spec), key=lambda own: places[id(own.instance)])
+    groups: dict[str, list[Instance]] = {}
+    for own in chosen:
+        groups.setdefault(METHODS[method].drives(own) + (SHIELD if shield else ""), []).append(own)
+    each = chain.from_iterable(outcomes(own, spec) for spec, own in groups.items())
+    found = sorted(each, key=lambda own: places[id(own.instance)])
     seconds = [own.act_s["mean"] for own in found if own.act_s]
     return columns(found), sum(seconds) / len(seconds) if seconds else 0.0
 

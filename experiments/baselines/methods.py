@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
+
+from dubins_traffic.problem.instance import Instance
+from experiments.baselines.gr1 import tulip
 
 HERE: Final = Path(__file__).parent
 _LEARNED: Final = HERE.parents[1] / "examples" / "learning"
@@ -16,10 +19,14 @@ class Method:
     """A method: its name on the page, the controller, and what there is to say about it in a sentence."""
 
     title: str
-    controller: str
+    controller: str | Callable[[Instance], str]
     says: str
     needs: str = ""
     """The library that it needs, as in its `constraints.txt`; none for most."""
+
+    def drives(self, instance: Instance) -> str:
+        """Return the controller in a trial."""
+        return self.controller if isinstance(self.controller, str) else self.controller(instance)
 
 
 def _of(folder: str, name: str) -> str:
@@ -46,6 +53,10 @@ METHODS: Final[Mapping[str, Method]] = {
     "gr1": Method(
         "GR(1) synthesis", _of("gr1", "Gr1"),
         "the winning strategy of the game of cells; gives up where that has over 3,000,000 positions",
+    ),
+    "gr1-tulip": Method(
+        "GR(1) synthesis by TuLiP", tulip.controller,
+        "the same by TuLiP with omega and dd, from the start of each trial; gives up over 3,000 positions", "tulip",
     ),
     "cloning": Method(
         "cloned from `rules`", str(_LEARNED / "junction.npz"), "DAgger on `junction`, a network of 96 and 48"

@@ -35,6 +35,20 @@ def test_every_point_lies_in_a_cell_of_its_segment(
             assert (int(np.floor((x + dx) / size)), int(np.floor((y + dy) / size))) in cells
 
 
+def test_a_point_lies_on_each_of_several_networks_where_it_would_on_that_alone() -> None:
+    networks = [generate(*size, 7, bent=0.3) for size in ((2, 1), (20, 26), (60, 80), (3, 2))]
+    widths = [0.6, 0.3, 0.05, 1.0]
+    together = pack(networks, widths)
+    points = np.random.default_rng(1).uniform(-5.0, 40.0, (400, 2))
+    for net, (network, width) in enumerate(zip(networks, widths, strict=True)):
+        alone = pack([network], [width])
+        for x, y in points.tolist():
+            for find in (nearest_segment, nearest_vertex, on_road):
+                assert find(together, net, x, y) == find(alone, 0, x, y), (find, net, x, y)
+        first = together.grid[net].pave_first
+        assert np.array_equal(together.pave[first : first + len(alone.pave)], alone.pave)
+
+
 @pytest.mark.parametrize(
     ("count", "roads", "bent"), [(2, 1, 0.0), (20, 26, 0.0), (20, 26, 0.6), (150, 210, 0.3)]
 )

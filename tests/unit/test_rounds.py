@@ -6,8 +6,8 @@ import numpy as np
 
 from dubins_traffic import draw, load_config
 from dubins_traffic.learning.outlook import metres_to_vertices
-from dubins_traffic.routing.rounds import find_all, round_time
-from dubins_traffic.routing.tours import EXACT, LaneGraph, find_round, find_rounds, lane_graph
+from dubins_traffic.routing.rounds import find_all, round_time, stages
+from dubins_traffic.routing.tours import EXACT, TOGETHER, LaneGraph, find_round, find_rounds, lane_graph
 
 
 def test_many_rounds_are_those_found_one_by_one() -> None:
@@ -19,19 +19,26 @@ def test_many_rounds_are_those_found_one_by_one() -> None:
         (0, 1, 0),
     ]
     together, alone = LaneGraph(network), LaneGraph(network)
-    find_rounds(together, lists)
+    find_rounds((together, goals) for goals in lists)
     assert set(together.rounds) == {tuple(dict.fromkeys(goals)) for goals in lists if goals}
     assert [find_round(together, goals) for goals in lists] == [find_round(alone, goals) for goals in lists]
 
 
-def test_rounds_of_trials_are_known_once_all_are_found() -> None:
-    problems = [draw(load_config("town"), seed=3, trial=k).problem for k in range(4)]
+def test_rounds_of_trials_on_many_networks_are_those_found_one_by_one() -> None:
+    problems = [draw(load_config("town"), seed=3, trial=k).problem for k in range(TOGETHER + 3)]
     find_all([(problem.network, problem.goal_vertices) for problem in problems])
     for problem in problems:
-        known = dict(lane_graph(problem.network).rounds)
-        assert len(known) == 1
-        assert round_time(problem.network, problem.goal_vertices, 0.5) > 0.0
-        assert lane_graph(problem.network).rounds == known
+        graph, alone = lane_graph(problem.network), LaneGraph(problem.network)
+        known, found = dict(graph.rounds), find_round(alone, problem.goal_vertices)
+        assert list(known.values()) == [found]
+        assert found is not None
+        assert round_time(problem.network, problem.goal_vertices, 0.5) == found.length / 0.5
+        goals, metres = stages(problem.network, problem.goal_vertices)
+        targets = [found.lanes[place] for place in found.arrivals]
+        assert goals.tolist() == [alone.end[lane] for lane in targets]
+        expected = np.array([alone.distances(lane) for lane in targets]) + np.array(alone.length)
+        assert np.array_equal(metres, expected)
+        assert graph.rounds == known
 
 
 def test_ways_to_intersections_are_the_shortest_to_any_lane_into_them() -> None:

@@ -26,3 +26,14 @@ class Gr1(Synthesized):
     def act(self, observation: Observation) -> Command | None:
         """Return the command, or give up."""
         return super().act(observation) if self._solved else None
+
+
+class GivesUp:
+    """Gives up at once."""
+
+    def start(self, _problem: Problem) -> None:
+        """Look at nothing."""
+
+    def act(self, _observation: Observation) -> Command | None:
+        """Give up."""
+        return None

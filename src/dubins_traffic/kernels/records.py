@@ -36,6 +36,7 @@ from __future__ import annotations
 import ctypes
 from collections.abc import Callable, Sequence
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any, Protocol, TypeVar, cast, dataclass_transform, get_type_hints, overload
 
 import numpy as np
@@ -106,11 +107,7 @@ class Table(np.ndarray[Any, Any]):
 
     RECORD: Any
     KIND: Callable[[Any, int], Any]
-    known: dict[Any, Any]
-
-    def __array_finalize__(self, source: Any) -> None:
-        """Begin without rows known."""
-        self.known = {}
+    known: dict[Any, Any] = cast(Any, MappingProxyType({}))  # a dictionary of its own once a row is asked for
 
     @cached_property
     def plain(self) -> npt.NDArray[Any] | None:
@@ -163,6 +160,8 @@ class Table(np.ndarray[Any, Any]):
         else:
             found = self._look_up(plain, place)
         if plain is not None and len(self.known) < MOST_KNOWN:
+            if not self.known:
+                self.known = {}
             self.known[place] = found
         return found
 

@@ -7,7 +7,7 @@ common is worked out once, by its `Recipe`.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import IntEnum
 from itertools import islice, repeat
 
@@ -134,7 +134,8 @@ class Recipe:
         self._laser = settings.laser
         self._disturbances = settings.disturbances
         self._names = ("ego", *(plan.agent.name for plan in configuration.agents))
-        self._steady = not any(drawn_cycle(plan.agent) for plan in configuration.agents)
+        self._agents = tuple([plan.agent for plan in configuration.agents])
+        self._steady = not any(map(drawn_cycle, self._agents))
         self._network = configuration.network
         self._site: Site | None = None
         self._areas_kept: tuple[RoadNetwork, Areas] | None = None
@@ -200,8 +201,9 @@ class Recipe:
         network = self._network or self._draw_network(Draws(seed, trial, Stream.NETWORK))
         if self._rules:
             check_demands(network, self._radius, self._car, self._settings.sensing_radius, self._rules)
-        planned = self._configuration.agents
-        agents = complete_agents(network, planned, Draws(seed, trial, Stream.CYCLES))
+        planned, agents = self._configuration.agents, self._agents
+        if not self._steady:
+            agents = complete_agents(network, planned, Draws(seed, trial, Stream.CYCLES))
         others = agent_wishes(network, planned, agents, self._car, self._obstacles)
         wishes = [Wish(self._ego_start(network), None, "ego.start"), *others]
         ground = Ground(network, self._car, self._radius, self._obstacles)
@@ -331,16 +333,17 @@ def drawn_cycle(agent: EAgent) -> bool:
 def complete_agents(
     network: RoadNetwork, planned: Sequence[PlannedAgent], draws: Draws
 ) -> tuple[EAgent, ...]:
-    """Return the e-agents with all that is random about them drawn."""
-    agents: list[EAgent] = []
-    for agent in (plan.agent for plan in planned):
-        parameters = dict(agent.parameters)
-        if drawn_cycle(agent):
-            cycle = {"cycle": draw_cycle(network, draws)}
-            nudged = agent.driver is not agent
-            parameters |= {"parameters": {**parameters["parameters"], **cycle}} if nudged else cycle
-        agents.append(EAgent(agent.kind, agent.name, agent.type, parameters))
-    return tuple(agents)
+    """Return the e-agents with all that is random about them drawn; the planned ones themselves where nothing is."""
+    return tuple([_completed(network, plan.agent, draws) for plan in planned])
+
+
+def _completed(network: RoadNetwork, agent: EAgent, draws: Draws) -> EAgent:
+    if not drawn_cycle(agent):
+        return agent
+    cycle = {"cycle": draw_cycle(network, draws)}
+    nudged = agent.driver is not agent
+    given = {"parameters": {**agent.parameters["parameters"], **cycle}} if nudged else cycle
+    return replace(agent, parameters={**agent.parameters, **given})
 
 
 def agent_wishes(

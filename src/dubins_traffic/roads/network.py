@@ -22,7 +22,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.records import Rows, table
-from dubins_traffic.roads.cells import with_cells, with_pave
+from dubins_traffic.roads.cells import with_cells
 from dubins_traffic.roads.chains import Bars, Chains, Corners, Runs, Segment, sides, turned
 from dubins_traffic.roads.checks import check
 from dubins_traffic.roads.formats import registry as formats
@@ -378,18 +378,17 @@ class RoadNetwork(Pictured):
         """Return the network as kernels read it, its roads `half_width` metres to either side (kept for next time)."""
         found = self._tables.get(half_width)
         if found is None:
-            found = self._tables[half_width] = with_pave(self.bare_table, half_width)
+            found = self._tables[half_width] = with_cells(self.rows(), [half_width])
         return found
 
     @cached_property
     def _tables(self) -> dict[float, RoadTable]:
         return {}
 
-    @cached_property
-    def bare_table(self) -> RoadTable:
-        """The network as kernels read it, but for the width of its roads (never to be written to)."""
+    def rows(self) -> RoadTable:
+        """Return the network as kernels read it, but for the width of its roads and cells."""
         none = np.zeros(0, dtype=np.int64)
-        bare = RoadTable(
+        return RoadTable(
             half_width=np.zeros(1),
             seg_off=np.array([0, len(self.segments)]),
             segment=self._segment_rows(),
@@ -402,7 +401,6 @@ class RoadNetwork(Pictured):
             grid=table(CellGrid, 1),
             **dict.fromkeys(("seg_start", "seg_item", "vert_start", "vert_item", "pave"), none),
         )
-        return with_cells(bare)
 
     def _segment_rows(self) -> Rows[SegmentRow]:
         rows = table(SegmentRow, len(self.segments))
@@ -438,21 +436,21 @@ class RoadNetwork(Pictured):
 
     def nearest_segment(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return number of and distance to the nearest segment of points (..., 2); ties: the lower number."""
-        number, square = nearest(self.bare_table, points)
+        number, square = nearest(self.table(0.0), points)
         return number, np.sqrt(square)
 
     def nearest_intersection(self, points: npt.ArrayLike) -> tuple[Ints, Floats]:
         """Return number of and distance to the nearest intersection of points (..., 2); ties: the lower number."""
-        number, square = nearest(self.bare_table, points, vertices=True)
+        number, square = nearest(self.table(0.0), points, vertices=True)
         return number, np.sqrt(square)
 
     def on_road(self, points: npt.ArrayLike, half_width: float) -> npt.NDArray[np.bool_]:
         """Whether points (..., 2) lie within `half_width` metres of a segment (its ends capped by discs)."""
-        return nearest(self.bare_table, points)[1] <= half_width * half_width
+        return nearest(self.table(0.0), points)[1] <= half_width * half_width
 
     def lane_coordinates(self, lane: int, points: npt.ArrayLike) -> tuple[Floats, Floats]:
         """Return (s, l) of points (..., 2): metres along a lane from its start, and left of the centre line."""
-        return coordinates(self.bare_table, lane, points)
+        return coordinates(self.table(0.0), lane, points)
 
     def bars(self, sagitta: float) -> Bars:
         """Return straight bars that stand for the segments: chains leave them by at most `sagitta` metres."""

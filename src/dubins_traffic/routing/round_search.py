@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import accumulate, repeat
 from typing import Any
 
 import numpy as np
@@ -38,7 +40,7 @@ class Search(Tables):
     `far` (n, 4, L): metres from the end of each lane to the end of each lane into a goal; `leg` (n, n, 4, 4): metres
     from the lanes into one goal to those into another; `total`, `other` (4, 4) and `to_go` (n + 1, 4): what is reckoned
     with; `order`, `best` (n,): orders of the goals; `queue`, `waits` (L,); and what is found: `lane` (n L,), `arrival`
-    (n,).
+    (n,), and `row` (n,): the rows of `far`, taken as (4n, L), of the lanes that arrive.
     """
 
     far: Floats
@@ -52,6 +54,32 @@ class Search(Tables):
     waits: Ints
     lane: Ints
     arrival: Ints
+    row: Ints
+
+
+def joined(graphs: Sequence[LaneTables]) -> tuple[LaneTables, list[int], list[int]]:
+    """Return several graphs as one, and the numbers in it of the first lane and the first intersection of each."""
+    lanes, places, steps = (
+        [0, *accumulate(len(array) for array in own)]
+        for own in zip(*((own.into, own.into_off[1:], own.after) for own in graphs), strict=True)
+    )
+    by = {
+        "after_off": steps,
+        "before_off": steps,
+        "after": lanes,
+        "before": lanes,
+        "into_off": lanes,
+        "into": lanes,
+    }
+    found: dict[str, Any] = {}
+    for name in LaneTables.field_names:
+        parts = [
+            getattr(own, name) + first for own, first in zip(graphs, by.get(name, repeat(0)), strict=False)
+        ]
+        if name.endswith("_off"):
+            parts[:-1] = [part[:-1] for part in parts[:-1]]
+        found[name] = np.concatenate(parts)
+    return LaneTables(**found), lanes, places
 
 
 def room(goals: int, lanes: int) -> Search:
@@ -68,6 +96,7 @@ def room(goals: int, lanes: int) -> Search:
         waits=np.zeros(lanes, dtype=np.int64),
         lane=np.zeros(goals * lanes, dtype=np.int64),
         arrival=np.zeros(goals, dtype=np.int64),
+        row=np.zeros(goals, dtype=np.int64),
     )
 
 
@@ -120,7 +149,8 @@ def metres_into(v: int, g: LaneTables, least: Floats, far: Floats, queue: Ints, 
 def shortest_round(goals: Ints, g: LaneTables, own: Search) -> tuple[int, float]:
     """Find the shortest round through the distinct intersections of `goals` (G,).
 
-    Its lanes are in `own.lane`, the places in it of those that end in a goal as it is reached in `own.arrival`.
+    Its lanes are in `own.lane`, the places in it of those that end in a goal as it is reached in `own.arrival`, and the
+    rows of `own.far` with the ways to them in `own.row`.
 
     Returns
     -------
@@ -261,5 +291,6 @@ def _trace(goals: Ints, g: LaneTables, own: Search) -> int:
             own.lane[done] = lane
             done += 1
         own.arrival[k] = done - 1
+        own.row[k] = own.far.shape[1] * b + following
         at = following
     return done

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
-from dubins_traffic.routing.tours import LaneGraph, find_round, find_rounds, free_round, lane_graph
+from dubins_traffic.routing.tours import find_round, find_rounds, free_round, lane_graph
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 
 def find_all(wanted: Iterable[tuple[RoadNetwork, Sequence[int]]]) -> None:
     """Find many rounds, in less time than `round_time` and `stages` take one after another."""
-    graphs: dict[int, tuple[LaneGraph, list[Sequence[int]]]] = {}
-    for network, goals in wanted:
-        _, lists = graphs.setdefault(id(network), (lane_graph(network), []))
-        lists.append(goals)
-    for graph, lists in graphs.values():
-        find_rounds(graph, lists)
+    find_rounds((lane_graph(network), goals) for network, goals in wanted)
 
 
 def round_time(network: RoadNetwork, goals: Sequence[int], speed: float) -> float:
@@ -48,7 +43,7 @@ def stages(network: RoadNetwork, goals: Sequence[int]) -> tuple[Ints, Floats]:
     kept = graph.stages.get(found)
     if kept is None:
         targets = [found.lanes[place] for place in found.arrivals]
-        distance = np.stack([graph.metres_to(target) for target in targets]) + np.array(graph.length)
+        distance = np.stack([graph.distances(target) for target in targets]) + np.array(graph.length)
         kept = np.array([graph.end[target] for target in targets], dtype=np.int64), distance
         graph.stages[found] = kept
     return kept

@@ -7,7 +7,8 @@ a dead end). It is as long as its lanes together, plus what its turns cost.
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain, pairwise
@@ -18,13 +19,23 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.routing.round_search import LaneTables, metres_into, metres_to, room, shortest_round
+from dubins_traffic.routing.round_search import (
+    ARMS,
+    LaneTables,
+    joined,
+    metres_into,
+    room,
+    shortest_round,
+)
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
 
 EXACT = 7
 """Up to this many goals the shortest round is found; of more goals the nearest is taken next."""
+
+TOGETHER = 16
+"""So many rounds are found on graphs that are made one: on each, the search looks at the lanes of all."""
 
 MOST_KEPT, FEWEST_KEPT = 1 << 19, 8
 """About how many numbers are cached of the rounds found on a network, and the least number of rounds."""
@@ -56,8 +67,9 @@ class LaneGraph:
         length = np.repeat(network.lengths, 2)
         lane = np.repeat(np.arange(count), [len(own) for own in follows])
         other = np.fromiter(chain.from_iterable(follows), dtype=np.int64)
-        steps = zip(lane.tolist(), other.tolist(), strict=True)
-        turn = 0.0 if turn_cost is None else np.array([turn_cost(*step) for step in steps])
+        turn: Floats | float = 0.0
+        if turn_cost is not None:
+            turn = np.array([turn_cost(*step) for step in zip(lane.tolist(), other.tolist(), strict=True)])
         cost = np.maximum(0.0, length[other] + turn)
         back, into = np.argsort(other, kind="stable"), np.argsort(end, kind="stable")
         self.tables = LaneTables(
@@ -87,13 +99,6 @@ class LaneGraph:
         """The lanes that each lane may follow, with what the step costs."""
         own = self.tables
         return _parts(list(zip(own.before.tolist(), own.before_cost.tolist(), strict=True)), own.before_off)
-
-    def metres_to(self, target: int) -> Floats:
-        """Return the result of `distances` without penalties, as an array."""
-        far = np.empty(self.count)
-        work = np.empty((2, self.count), dtype=np.int64)
-        metres_to(target, self.tables, far, work[0], work[1])
-        return far
 
     def metres_into(self, intersections: Iterable[int]) -> list[Floats]:
         """Return the metres from the end of each lane to each of some intersections, (L,); inf: there is no way."""
@@ -156,7 +161,9 @@ def lane_graph(network: RoadNetwork) -> LaneGraph:
 
 
 def _offsets(owner: Ints, count: int) -> Ints:
-    return np.concatenate([[0], np.cumsum(np.bincount(owner, minlength=count))])
+    off = np.zeros(count + 1, dtype=np.int64)
+    np.cumsum(np.bincount(owner, minlength=count), out=off[1:])
+    return off
 
 
 def _parts(flat: list[T], off: Ints) -> list[list[T]]:
@@ -174,25 +181,29 @@ def find_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
     if not distinct:
         return None
     if distinct not in graph.rounds:
-        find_rounds(graph, [distinct])
+        find_rounds([(graph, distinct)])
     return graph.rounds[distinct]
 
 
-def find_rounds(graph: LaneGraph, many: Iterable[Sequence[int]]) -> None:
-    """Find the rounds through each of many lists of goals, in less time than one after another, for `find_round`."""
-    wanted: dict[int, list[tuple[int, ...]]] = {}
-    for distinct in dict.fromkeys([tuple(dict.fromkeys(goals)) for goals in many]):
+def find_rounds(many: Iterable[tuple[LaneGraph, Sequence[int]]]) -> None:
+    """Find the rounds through many lists of goals, in less time than one after another, for `find_round`."""
+    wanted: dict[int, dict[tuple[LaneGraph, tuple[int, ...]], None]] = {}
+    for graph, goals in many:
+        distinct = tuple(dict.fromkeys(goals))
         if distinct and distinct not in graph.rounds:
-            wanted.setdefault(len(distinct), []).append(distinct)
-    count = sum(map(len, wanted.values()))
-    if len(graph.rounds) + count > max(FEWEST_KEPT, MOST_KEPT // graph.count):
-        graph.rounds.clear()
-        graph.stages.clear()
-    for number, lists in wanted.items():
+            wanted.setdefault(len(distinct), {})[graph, distinct] = None
+    for graph, count in Counter([graph for own in wanted.values() for graph, _ in own]).items():
+        if len(graph.rounds) + count > max(FEWEST_KEPT, MOST_KEPT // graph.count):
+            graph.rounds.clear()
+            graph.stages.clear()
+    for number, own in wanted.items():
+        pairs = list(own)
         if number <= EXACT:
-            graph.rounds.update(zip(lists, _shortest(graph, number, lists), strict=True))
+            for k in range(0, len(pairs), TOGETHER):
+                _find_shortest(number, pairs[k : k + TOGETHER])
         else:
-            graph.rounds.update([(goals, _nearest_first(graph, goals)) for goals in lists])
+            for graph, goals in pairs:
+                graph.rounds[goals] = _nearest_first(graph, goals)
 
 
 def free_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
@@ -208,14 +219,25 @@ def free_round(graph: LaneGraph, goals: Sequence[int]) -> Round | None:
     return None if back < 0 else Round((back ^ 1, back), (1,), 2.0 * graph.length[back])
 
 
-def _shortest(graph: LaneGraph, number: int, lists: Iterable[tuple[int, ...]]) -> Iterator[Round | None]:
-    """Yield the shortest round through each of some lists of so many goals."""
-    own, places, search = room(number, graph.count), np.zeros(number, dtype=np.int64), bound(shortest_round)
-    for goals in lists:
-        places[:] = goals
-        lanes, length = search(places, graph.tables, own)
-        found = tuple(own.lane[:lanes].tolist()), tuple(own.arrival.tolist())
-        yield Round(*found, length) if lanes else None
+def _find_shortest(number: int, wanted: Sequence[tuple[LaneGraph, tuple[int, ...]]]) -> None:
+    """Find the shortest round through each of some lists of so many goals, and the ways to them."""
+    graphs = dict.fromkeys([graph for graph, _ in wanted])
+    whole, lanes, places = joined([graph.tables for graph in graphs])
+    first = dict(zip(graphs, zip(lanes, places, strict=True), strict=False))
+    own, sought, search = room(number, lanes[-1]), np.zeros(number, dtype=np.int64), bound(shortest_round)
+    far = own.far.reshape(-1, lanes[-1])
+    for graph, goals in wanted:
+        lane, place = first[graph]
+        sought[:] = goals
+        sought += place
+        count, length = search(sought, whole, own)
+        if not count:
+            graph.rounds[goals] = None
+            continue
+        found = Round(tuple((own.lane[:count] - lane).tolist()), tuple(own.arrival.tolist()), length)
+        distance = far[own.row, lane : lane + graph.count] + np.array(graph.length)
+        graph.rounds[goals] = found
+        graph.stages[found] = np.array(goals, dtype=np.int64)[own.row // ARMS], distance
 
 
 def _nearest_first(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
