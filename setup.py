@@ -33,9 +33,7 @@ def commit() -> str:
         return named.read_text(encoding="ascii")
     if not (HERE / ".git").exists():
         return ""
-    found = subprocess.run(
-        ["git", "rev-parse", "HEAD"], cwd=HERE, capture_output=True, text=True, check=False
-    )
+    found = subprocess.run(["git", "rev-parse", "HEAD"], cwd=HERE, capture_output=True, text=True, check=False)
     return found.stdout
 
 

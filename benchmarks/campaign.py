@@ -114,8 +114,7 @@ def measure() -> list[Row]:
         Row("more time on Ray than in the pool", f"{slower:+.1%}", "<= 15 %", slower <= 0.15),
         Row(
             "whole campaigns, with starting and ending the workers: pool, Ray",
-            f"{both[0].seconds:.1f} s, {both[1].seconds:.1f} s, "
-            f"{both[1].seconds / both[0].seconds:.2f} times",
+            f"{both[0].seconds:.1f} s, {both[1].seconds:.1f} s, {both[1].seconds / both[0].seconds:.2f} times",
             "",
             True,
         ),

@@ -143,9 +143,7 @@ def _actions(commands: Floats, instance: Instance) -> Floats:
     return commands / np.array([bounds.speed, bounds.yaw_rate])
 
 
-def _round(
-    document: dict[str, Any], instances: list[Instance], actions: Floats
-) -> tuple[float, float, float]:
+def _round(document: dict[str, Any], instances: list[Instance], actions: Floats) -> tuple[float, float, float]:
     """Return the seconds of whole trials, of a step every tick, and of one every few ticks."""
     began = process_time()
     list(outcomes(instances, batch=ENVS))

@@ -57,9 +57,7 @@ def _first(command: str) -> list[Row]:
     plain = min(_run(command, {"NUMBA_DISABLE_JIT": "1"})[0] for _ in range(ROUNDS))
     first = min(_in_empty_cache(command) for _ in range(ROUNDS))
     ratio = first / plain
-    rows = [
-        Row(f"{command}, empty cache", f"{first:.2f} s, {ratio:.2f} of interpreted", "<= 1.5", ratio <= 1.5)
-    ]
+    rows = [Row(f"{command}, empty cache", f"{first:.2f} s, {ratio:.2f} of interpreted", "<= 1.5", ratio <= 1.5)]
     if BEFORE in os.environ:
         before = _in_empty_cache(command, os.environ[BEFORE])
         part = first / before
@@ -171,9 +169,7 @@ def _warm(command: str) -> Row:
 
 def _run(command: str, variables: Mapping[str, str], program: Sequence[str] = COMMAND) -> tuple[float, float]:
     """Return the time on the clock and the processor time of a command, seconds."""
-    around = {
-        name: value for name, value in os.environ.items() if name != "DUBINS_TRAFFIC_KERNELS"
-    } | variables
+    around = {name: value for name, value in os.environ.items() if name != "DUBINS_TRAFFIC_KERNELS"} | variables
     before, began = resource.getrusage(resource.RUSAGE_CHILDREN), perf_counter()
     quiet = subprocess.DEVNULL
     subprocess.run([*program, *command.split()], check=True, stdout=quiet, stderr=quiet, env=around)

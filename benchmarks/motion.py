@@ -27,9 +27,7 @@ CHUNK = 256
 
 
 @jit
-def bare(
-    x: Floats, y: Floats, c: Floats, s: Floats, u: Floats, w: Floats, dt: float, reach: float, hits: Ints
-) -> None:
+def bare(x: Floats, y: Floats, c: Floats, s: Floats, u: Floats, w: Floats, dt: float, reach: float, hits: Ints) -> None:
     """Move every car along its arc, then count the pairs of each trial that overlap at the end.
 
     Arrays are (cars, trials), so that one instruction works on many trials; CHUNK trials at a time stay in the

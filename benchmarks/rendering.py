@@ -37,9 +37,7 @@ def measure() -> list[Row]:
     rng = np.random.default_rng(1)
     low, high = problem.network.points.min(axis=0), problem.network.points.max(axis=0)
     places, angles = rng.uniform(low, high, (FRAMES, CARS, 2)), rng.uniform(0.0, 6.28, (FRAMES, CARS))
-    columns = [
-        np.ascontiguousarray(part) for part in (*np.moveaxis(places, 2, 0), np.cos(angles), np.sin(angles))
-    ]
+    columns = [np.ascontiguousarray(part) for part in (*np.moveaxis(places, 2, 0), np.cos(angles), np.sin(angles))]
     raster = Raster(problem, width=SIDE, height=SIDE)
     raster.frame(*(column[0] for column in columns))
     plot = _Plotted(problem)
@@ -116,9 +114,7 @@ class _Plotted:
         self._shapes: list[tuple[Any, Any]] = []
         zero = Pose(0.0, 0.0, 1.0, 0.0)
         for car in range(CARS):
-            (body,) = self._axes.fill(
-                *outline(self._body, zero).T, color=palette.car_colour(car), animated=True
-            )
+            (body,) = self._axes.fill(*outline(self._body, zero).T, color=palette.car_colour(car), animated=True)
             (tip,) = self._axes.fill(*nose(self._body, zero).T, color="white", animated=True)
             self._shapes.append((body, tip))
         self._agg.draw()

@@ -99,9 +99,7 @@ def _lockstep(uri: str, instance: dt.Instance, environment: dict[str, str]) -> l
     bare = (bare + again) / 2
     added = float(np.median(ticks)) - here
     figure = f"{added * 1e6:.0f} us beside {bare * 1e6:.0f} us, {added / bare:.2f}x"
-    return [
-        Row("added by a lockstep tick over ROS 1, bare ping-pong", figure, "<= 1.5x", added <= 1.5 * bare)
-    ]
+    return [Row("added by a lockstep tick over ROS 1, bare ping-pong", figure, "<= 1.5x", added <= 1.5 * bare)]
 
 
 def _real_time(uri: str, environment: dict[str, str]) -> list[Row]:

@@ -44,9 +44,7 @@ def boxed_start() -> float:
     python, shown, _ = interpreter()
     library = {"LD_LIBRARY_PATH": f"{PYTHON}/lib"} if python.startswith(PYTHON) else {}
     began = perf_counter()
-    processes = Processes(
-        Program((python, "-I", "-S", "-c", "pass"), shown, library), Limits(), available_layers()
-    )
+    processes = Processes(Program((python, "-I", "-S", "-c", "pass"), shown, library), Limits(), available_layers())
     status = processes.status(60.0)
     processes.close()
     assert status == "status 0", status

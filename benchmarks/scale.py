@@ -33,9 +33,7 @@ def crowd(side: int) -> Instance:
             tx, ty = float(x1 - x0) / length, float(y1 - y0) / length
             starts.append(Pose(float(x0) + 2.0 * tx, float(y0) + 2.0 * ty, tx, ty))
     agent = small.e_agents[0]
-    agents = tuple(
-        EAgent("lawful", f"agent{n}", agent.type, agent.parameters) for n in range(len(starts) - 1)
-    )
+    agents = tuple(EAgent("lawful", f"agent{n}", agent.type, agent.parameters) for n in range(len(starts) - 1))
     problem = replace(
         small.problem,
         network=network,

@@ -126,9 +126,7 @@ def measure(
         s3.store(Path(name) / "s3") as store,
         mock.patch.dict(os.environ, store.environment()),
     ):
-        settings = (
-            f'database = "{cluster.url("season")}"\nstorage = "s3://{s3.BUCKET}/here"\nlogins = 100000\n'
-        )
+        settings = f'database = "{cluster.url("season")}"\nstorage = "s3://{s3.BUCKET}/here"\nlogins = 100000\n'
         with season(Path(name), "--workers", str(workers), settings=settings, trials=trials) as service:
             found = held(service, submissions, teams, trials)
     table, health = found.reader.late(TABLE), found.reader.late(HEALTH)

@@ -49,14 +49,10 @@ async def read(client: httpx.AsyncClient, paths: Sequence[str], until: float, pa
     return took
 
 
-async def all_read(
-    url: str, cookies: httpx.Cookies, paths: Sequence[str], seconds: float, pause: float
-) -> list[float]:
+async def all_read(url: str, cookies: httpx.Cookies, paths: Sequence[str], seconds: float, pause: float) -> list[float]:
     """Let all readers read at a time, each by a connection of its own."""
     limits = httpx.Limits(max_connections=READERS, max_keepalive_connections=READERS)
-    async with httpx.AsyncClient(
-        base_url=url, cookies=cookies, timeout=60, limits=limits, verify=False
-    ) as client:
+    async with httpx.AsyncClient(base_url=url, cookies=cookies, timeout=60, limits=limits, verify=False) as client:
         until = time.perf_counter() + seconds
         found = await asyncio.gather(*(read(client, paths, until, pause) for _ in range(READERS)))
     return list(itertools.chain.from_iterable(found))
@@ -97,9 +93,7 @@ def delay() -> int:
         database = Database(f"sqlite:///{name}/queue.db")
         database.migrate()
         with database.writing() as session:
-            phase = Phase(
-                name="p", shows="all", competition=Competition(slug="c", title="", document="", created=0.0)
-            )
+            phase = Phase(name="p", shows="all", competition=Competition(slug="c", title="", document="", created=0.0))
             session.add(phase)
             for k in range(2):
                 team = accounts.make_team(session, f"t{k}", 0.0)

@@ -37,9 +37,7 @@ def _row(
     times: list[float] = []
     for _ in range(turns):
         began = perf_counter()
-        subprocess.run(
-            command, check=True, stdout=subprocess.DEVNULL, env={**os.environ, **(variables or {})}
-        )
+        subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env={**os.environ, **(variables or {})})
         times.append(perf_counter() - began)
     median = sorted(times)[len(times) // 2]
     return Row(name, f"{median:.2f} s", f"< {bar:g} s", median < bar)

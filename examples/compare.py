@@ -99,9 +99,7 @@ def compare(configuration: str, output: Path, controllers: Sequence[str], trials
 
 def main() -> int:
     """Read the command line and compare."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("configuration", help="a file or the name of a shipped configuration")
     parser.add_argument("output", type=Path, help="folder for what is left")
     parser.add_argument("--controllers", nargs="+", default=["lanes", "simple"])

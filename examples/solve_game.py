@@ -36,9 +36,7 @@ def winning(arrays: Mapping[str, npt.NDArray[Any]]) -> Flags:
     def recurring(won: Flags) -> Flags:
         for nodes in header["targets"]:
             base = np.isin(ego_cell, nodes) & controllable(won)
-            won = won & _repeat(
-                lambda near, base=base: base | _nearer(near, controllable, debts), np.zeros_like(won)
-            )
+            won = won & _repeat(lambda near, base=base: base | _nearer(near, controllable, debts), np.zeros_like(won))
         return won
 
     return _repeat(recurring, np.ones(len(ego_cell), dtype=bool))

@@ -119,9 +119,7 @@ def compared(count: int, folder: Path) -> tuple[int, int, list[str]]:
     home = {(own.digest, one.number): one for own in found for one in judge(phase, order, own) if one.counts}
     random.Random(count).shuffle(order)
     chunks = [order[first : first + CHUNK] for first in range(0, len(order), CHUNK)]
-    parts = [
-        Part(phase, own, {number: seeds[number] for number in chunk}) for own in found for chunk in chunks
-    ]
+    parts = [Part(phase, own, {number: seeds[number] for number in chunk}) for own in found for chunk in chunks]
     random.Random(2 * count).shuffle(parts)
     equal, differ = 0, list[str]()
     for part, results in zip(parts, at_a_server(parts, 2), strict=True):

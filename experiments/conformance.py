@@ -107,17 +107,11 @@ def bars(found: Sequence[Came]) -> list[Row]:
         met = not missed or not bar
         rows.append(Row(f"{name}, {len(own):,} trials of {SECONDS:.0f} s: {says}", told, bar, met))
     waits = [one.waited / one.bound for one in blocking if not failed(one)]
-    rows.append(
-        Row("longest wait of the others, share of its bound", f"{max(waits, default=0.0):.2f}", "", True)
-    )
+    rows.append(Row("longest wait of the others, share of its bound", f"{max(waits, default=0.0):.2f}", "", True))
     unclean = sum(1 for own in admitted if own.name in PROVOKING and own.own)
-    rows.append(
-        Row("trials that do not count: who is to provoke breaks a rule first", f"{unclean:,}", "", True)
-    )
+    rows.append(Row("trials that do not count: who is to provoke breaks a rule first", f"{unclean:,}", "", True))
     refused = len(found) - len(admitted)
-    rows.append(
-        Row("trials that do not count: an obstacle bars a goal, or the way", f"{refused:,}", "", True)
-    )
+    rows.append(Row("trials that do not count: an obstacle bars a goal, or the way", f"{refused:,}", "", True))
     return rows
 
 

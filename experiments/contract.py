@@ -143,9 +143,7 @@ def searched(name: str, trials: int, seconds: float, seed: int, workers: int) ->
     print(f"{name}: {found.trials:,} trials, {found.violated} found, {took:.0f} s", flush=True)
     for case in found.cases.values():
         print(f"  {case.story.sentence}", flush=True)
-    return Count(
-        name, sources, seed, found.trials, found.violated, found.discarded, tuple(sorted(found.cases))
-    )
+    return Count(name, sources, seed, found.trials, found.violated, found.discarded, tuple(sorted(found.cases)))
 
 
 def together(counts: Iterable[Count]) -> list[Count]:
@@ -154,9 +152,7 @@ def together(counts: Iterable[Count]) -> list[Count]:
     They are in the order of the searches, those of these sources first.
     """
     before = load("contract")
-    stored = [
-        Count(**{**count, "kinds": tuple(count["kinds"])}) for count in (before.counts if before else ())
-    ]
+    stored = [Count(**{**count, "kinds": tuple(count["kinds"])}) for count in (before.counts if before else ())]
     sources = code(*RESTS_ON)
     latest = {(count.search, count.code, count.seed): count for count in (*stored, *counts)}
     found: list[Count] = []
@@ -207,8 +203,7 @@ def main() -> int:
     parser.add_argument("--store", action="store_true")
     asked = parser.parse_args()
     counts = [
-        searched(name, asked.trials, asked.seconds, asked.seed, asked.workers)
-        for name in asked.searches.split(",")
+        searched(name, asked.trials, asked.seconds, asked.seed, asked.workers) for name in asked.searches.split(",")
     ]
     if asked.store:
         counts = together(counts)

@@ -72,10 +72,7 @@ def provoked(scene: tuple[str, int, int]) -> Came | None:
 def drives(trials: int = TRIALS, jobs: int = 2) -> list[Drive]:
     """Run so many trials of each controller, delay and kind, in `jobs` processes."""
     kinds: tuple[Cars, ...] = ("ego", "all")
-    asked = [
-        Drive(name, delay, n, cars)
-        for name, cars, delay, n in product(CONTROLLERS, kinds, LEAST, range(trials))
-    ]
+    asked = [Drive(name, delay, n, cars) for name, cars, delay, n in product(CONTROLLERS, kinds, LEAST, range(trials))]
     with ProcessPoolExecutor(jobs) as pool:
         return list(pool.map(driven, asked, chunksize=4))
 
@@ -84,9 +81,7 @@ def scenes(variations: int = SCENES, jobs: int = 2) -> list[tuple[int, Came | No
     """Run so many variations of each scene with each delay; return the delays with what came of it."""
     asked = [(name, n, delay) for name in PROVOKING for n in range(variations) for delay in LEAST]
     with ProcessPoolExecutor(jobs) as pool:
-        return list(
-            zip([delay for _, _, delay in asked], pool.map(provoked, asked, chunksize=4), strict=True)
-        )
+        return list(zip([delay for _, _, delay in asked], pool.map(provoked, asked, chunksize=4), strict=True))
 
 
 def bars(every: list[Drive], staged: list[tuple[int, Came | None]]) -> list[Row]:
@@ -98,9 +93,7 @@ def bars(every: list[Drive], staged: list[tuple[int, Came | None]]) -> list[Row]
         for delay, least in LEAST.items():
             own = [one for one in every if (one.controller, one.delay, one.cars) == (name, delay, cars)]
             broken, share = sum(bool(one.broken) for one in own), sum(one.rounds for one in own) / usual
-            says = (
-                f"`{name}`, {whose[cars]} {delay} ticks late: trials of {len(own)} in which a rule is broken"
-            )
+            says = f"`{name}`, {whose[cars]} {delay} ticks late: trials of {len(own)} in which a rule is broken"
             rows.append(Row(says, str(broken), "0", not broken))
             bar = f">= {least:g}" if least else ""
             rows.append(Row("rounds, of those without delay", f"{share:.2f}", bar, share >= least))
@@ -108,9 +101,7 @@ def bars(every: list[Drive], staged: list[tuple[int, Came | None]]) -> list[Row]
         came = [one for own, one in staged if own == delay]
         fit = [one for one in came if one is not None and one.admitted and not one.own]
         broken = sum(bool(one.others) for one in fit)
-        says = (
-            f"scenes, all cars {delay} ticks late: trials of {len(fit)} in which a lawful car breaks a rule"
-        )
+        says = f"scenes, all cars {delay} ticks late: trials of {len(fit)} in which a lawful car breaks a rule"
         refused = f" ({sum(one is None for one in came)} refused)"
         rows.append(Row(says, f"{broken}{refused}", "0", not broken))
     return rows

@@ -53,9 +53,7 @@ def against_monte_carlo(runs: int, trials: int) -> Row:
         f"mean {mean:.2e}, variation {spread:.2f} a run of {np.mean([own.trials for own in found]):,.0f} trials; Monte "
         f"Carlo {happened / trials:.2e} ({low:.2e} to {high:.2e}); {away:.0%} apart; known {3.0**-COMMON:.2e}"
     )
-    return Row(
-        f"{runs} runs of 200 particles, {trials:,} trials of Monte Carlo", told, f"{AWAY:.0%}", away <= AWAY
-    )
+    return Row(f"{runs} runs of 200 particles, {trials:,} trials of Monte Carlo", told, f"{AWAY:.0%}", away <= AWAY)
 
 
 def one_in_a_million(runs: int) -> Row:

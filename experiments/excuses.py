@@ -45,9 +45,7 @@ def measure(episodes: int = EPISODES) -> list[Row]:
     rows: list[Row] = []
     for excuses, words in kinds:
         share = 1.0 - costs(excuses, episodes) / every
-        rows.append(
-            Row(f"{words}; of {every:.0f} breaches of the ego's are forgiven", f"{share:.0%}", "", True)
-        )
+        rows.append(Row(f"{words}; of {every:.0f} breaches of the ego's are forgiven", f"{share:.0%}", "", True))
     return rows
 
 

@@ -134,9 +134,7 @@ def planted(trials: int, seeds: Sequence[int], file: Path) -> list[Row]:
             )
         )
     half = len(MUTANTS) / 2
-    rows.append(
-        Row("mutants on which a fifth of the trials is enough", f"{quicker}", "half", quicker >= half)
-    )
+    rows.append(Row("mutants on which a fifth of the trials is enough", f"{quicker}", "half", quicker >= half))
     return rows
 
 
@@ -149,9 +147,7 @@ def crossing(seeds: Sequence[int]) -> list[Row]:
             for strategy in ("evolution", "uniform")
         }
         evolved, drawn = (median(hits[strategy], MOST_THERE) for strategy in ("evolution", "uniform"))
-        told = (
-            f"median {spread(hits['evolution'], MOST_THERE)}; at random {spread(hits['uniform'], MOST_THERE)}"
-        )
+        told = f"median {spread(hits['evolution'], MOST_THERE)}; at random {spread(hits['uniform'], MOST_THERE)}"
         rows.append(Row(f"{name} on {WORLD}, of {len(seeds)} seeds", told, "<= at random", evolved <= drawn))
     return rows
 
@@ -216,12 +212,8 @@ def overhead(world: Configuration, name: str, trials: int = 32 * GENERATION, rou
     """
     searched, plain = zip(*[_taken(world, trials) for _ in range(1 + rounds)][1:], strict=True)
     more = min(searched) / min(plain) - 1.0
-    told = (
-        f"{1e3 * min(searched) / trials:.2f} ms a trial, {more:.0%} over {1e3 * min(plain) / trials:.2f} ms"
-    )
-    return Row(
-        f"search of rules in {name}, {trials:,} trials of 15 s", told, f"<= {OVERHEAD:.0%}", more <= OVERHEAD
-    )
+    told = f"{1e3 * min(searched) / trials:.2f} ms a trial, {more:.0%} over {1e3 * min(plain) / trials:.2f} ms"
+    return Row(f"search of rules in {name}, {trials:,} trials of 15 s", told, f"<= {OVERHEAD:.0%}", more <= OVERHEAD)
 
 
 def _taken(world: Configuration, trials: int) -> tuple[float, float]:
@@ -261,9 +253,7 @@ def drivers(trials: int, folder: Path) -> list[Row]:
     rows: list[Row] = []
     for name in ("rules", "lanes+shield"):
         found = _searched(name, "evolution", trials, folder)
-        rows.append(
-            Row(f"{name}, {trials:,} searched trials: broke a rule in", _told(found), "0", not found.violated)
-        )
+        rows.append(Row(f"{name}, {trials:,} searched trials: broke a rule in", _told(found), "0", not found.violated))
     found = _searched("rules", "uniform", trials, folder)
     low, high = clopper_pearson(found.violated, found.trials)
     told = f"{_told(found)}; 95 % interval {low:.1e} to {high:.1e}"

@@ -94,9 +94,7 @@ def way_is_free(problem: Problem, x: Any, y: Any, c: float, s: float) -> bool:
     end = network.lane_ends(lane)[1]
     own, _ = network.lane_coordinates(lane, ego)
     there, left = network.lane_coordinates(lane, others)
-    ahead = (
-        (there > own) & (there - own < LANE_AHEAD + reach) & (left - reach < 0.0) & (left + reach > -2.0 * w)
-    )
+    ahead = (there > own) & (there - own < LANE_AHEAD + reach) & (left - reach < 0.0) & (left + reach > -2.0 * w)
     if ahead.any():
         return False
     vertices = [end] if float(network.lengths[segment] - own) < radius + reach + LOOK else []

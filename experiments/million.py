@@ -36,9 +36,7 @@ def measure(trials: int = TRIALS) -> list[Row]:
         ran = run_campaign(campaign, Path(folder) / "out", workers=WORKERS)
         table = (ran.folder / "results.parquet").stat().st_size
     minutes = (perf_counter() - began) / 60.0
-    own, worker = (
-        resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN)
-    )
+    own, worker = (resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     memory = (own + WORKERS * worker) / 2**20
     rate = f"{trials / (60.0 * minutes):,.0f} trials/s"
     return [

@@ -139,8 +139,7 @@ class Swings(Odd):
         if seen.lane < 0 or seen.bits & FLAG.LEFT:
             return self.law
         followed = any(
-            car.propositions.lane == seen.lane and self._is_behind(observation, car.pose)
-            for car in observation.others
+            car.propositions.lane == seen.lane and self._is_behind(observation, car.pose) for car in observation.others
         )
         if self.dice.random() < (0.03 if followed else 0.004):
             self._swings = 2 * self.dice.randrange(5, 60)

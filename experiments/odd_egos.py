@@ -70,9 +70,7 @@ def instance(number: int, seconds: float = DURATION) -> Instance:
         agents = [{"type": "counter", "name": f"car{k}"} for k in range(2)]
     more: dict[str, Any] = {}
     if blocked and not team:
-        more["obstacles"] = _obstacles(
-            random_trial(network, agents, seconds, SEED, number, rules=True), draws
-        )
+        more["obstacles"] = _obstacles(random_trial(network, agents, seconds, SEED, number, rules=True), draws)
     return random_trial(network, agents, seconds, SEED, number, rules=True, **more)
 
 
@@ -104,20 +102,14 @@ def trial(number: int, seconds: float = DURATION) -> Oddity:
     score = run_trial(own, KINDS[kind](number)).score
     verdict = score.verdict
     assert verdict is not None
-    traffic = sorted(
-        {agent.kind for agent in own.e_agents} | ({"obstacles"} if own.problem.obstacles else set())
-    )
+    traffic = sorted({agent.kind for agent in own.e_agents} | ({"obstacles"} if own.problem.obstacles else set()))
     return Oddity(
         number,
         NAMES[kind],
         "+".join(traffic),
         str(score.end),
         tuple(one.rule for one in verdict.violations if one.car == "ego"),
-        tuple(
-            f"{one.rule} {one.car} {one.since:.2f}-{one.time:.2f}"
-            for one in verdict.violations
-            if one.car != "ego"
-        ),
+        tuple(f"{one.rule} {one.car} {one.since:.2f}-{one.time:.2f}" for one in verdict.violations if one.car != "ego"),
         score.driven.distance_m,
     )
 

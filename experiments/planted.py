@@ -38,9 +38,7 @@ RING: Final = [[0, 0, 1, 0], [0, 0, 0, 1], [1, 0, 1, 1], [0, 1, 1, 1]]
 STANDS: Final = "experiments.free_egos:Stands"
 
 
-def world(
-    segments: list[list[int]], agents: list[dict[str, Any]], seconds: float, **more: Any
-) -> dict[str, Any]:
+def world(segments: list[list[int]], agents: list[dict[str, Any]], seconds: float, **more: Any) -> dict[str, Any]:
     """Return a configuration whose goals are the first and the last intersection."""
     height, width = (1 + max(max(row[k::2]) for row in segments) for k in (1, 0))
     return {

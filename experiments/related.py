@@ -72,9 +72,7 @@ def bars(every: Sequence[Found]) -> list[Row]:
     moves = sum(one.relation.moves for one in every)
     broken = [one for one in every if one.broken]
     strays = [one for one in every if not one.relation.related]
-    renewed, reordered = (
-        sum(getattr(one.relation, name) for one in every) for name in ("renewed", "reordered")
-    )
+    renewed, reordered = (sum(getattr(one.relation, name) for one in every) for name in ("renewed", "reordered"))
     crowded = sum(one.relation.crowded for one in every) / len(every)
     rows = [
         Row(

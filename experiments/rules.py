@@ -100,9 +100,7 @@ def instance(
     return random_trial(network, agents, seconds, seed, number, rules=True, **car)
 
 
-def drive(
-    number: int, kind: str = "lawful", seconds: float = DURATION, body: Mapping[str, Any] | None = None
-) -> Drive:
+def drive(number: int, kind: str = "lawful", seconds: float = DURATION, body: Mapping[str, Any] | None = None) -> Drive:
     """Run `rules` on an instance, with a car of its own if `body` says so."""
     own = instance(number, kind, seconds, body=body)
     watch = Waiting()
@@ -157,9 +155,7 @@ def _orderly(trials: str, drives: Sequence[Drive]) -> list[Row]:
     return [
         Row(f"{trials}: collisions", str(collisions), "0", collisions == 0),
         Row(f"{trials}: in which e-agents break a rule", str(broke), "0", broke == 0),
-        Row(
-            "30 % of the free-flow rounds made", f"{100 * enough:.1f} % of trials", ">= 95 %", enough >= 0.95
-        ),
+        Row("30 % of the free-flow rounds made", f"{100 * enough:.1f} % of trials", ">= 95 %", enough >= 0.95),
         Row("longest time at a stop line", f"{waited:.1f} s", "<= 60 s", waited <= 60.0),
         Row("median distance per free-flow distance", f"{distance:.3f}", "", True),
     ]

@@ -156,9 +156,7 @@ def _run(own: Sequence[Instance], kinds: Sequence[str]) -> Iterator[Shielded]:
         yield _shielded(own[b], kinds[b], outcome.score, told, int(passed[b]))
 
 
-def _shielded(
-    own: Instance, kind: str, score: Score, reasons: Mapping[str, int], passed: int = 0
-) -> Shielded:
+def _shielded(own: Instance, kind: str, score: Score, reasons: Mapping[str, int], passed: int = 0) -> Shielded:
     verdict = score.verdict
     assert verdict is not None
     return Shielded(
@@ -180,9 +178,7 @@ def ruled(number: int, seconds: float = DURATION, bent: float = 0.0) -> Shielded
     """Run a trial of the controller `rules` under the shield."""
     driver, own = Shield("rules"), instance(number, seconds, bent)
     score = run_trial(own, driver).score
-    return _shielded(
-        own, "rules", score, {"": driver.shield_filter.count} if driver.shield_filter.count else {}
-    )
+    return _shielded(own, "rules", score, {"": driver.shield_filter.count} if driver.shield_filter.count else {})
 
 
 def bars(found: Sequence[Shielded]) -> list[Row]:
@@ -198,9 +194,7 @@ def bars(found: Sequence[Shielded]) -> list[Row]:
         own = [one for one in hostile if one.kind == kind]
         ticks = sum(sum(one.reasons.values()) for one in own) / max(len(own), 1) / (30.0 * DURATION)
         driven = sum(one.distance for one in own) / max(len(own), 1)
-        rows.append(
-            Row(f"{kind}: ticks stepped in; driven", f"{100 * ticks:.1f} %; {driven:.1f} m", "", True)
-        )
+        rows.append(Row(f"{kind}: ticks stepped in; driven", f"{100 * ticks:.1f} %; {driven:.1f} m", "", True))
     return rows
 
 

@@ -152,9 +152,7 @@ def halts(scene: Scene) -> Floats:
 def quits(scene: Scene) -> Floats:
     """As the law says until the centre line is crossed; then at random for up to two seconds each, until it is not."""
     across = scene.left > 0.0
-    return hold(
-        scene, np.where(across[:, None], scene.wild, scene.law), np.where(across, 60.0 * scene.dice, 1.0)
-    )
+    return hold(scene, np.where(across[:, None], scene.wild, scene.law), np.where(across, 60.0 * scene.dice, 1.0))
 
 
 def lingers(scene: Scene) -> Floats:
@@ -186,9 +184,7 @@ class Hostile:
         What all random numbers follow from.
     """
 
-    def __init__(
-        self, kinds: Sequence[str], vehicles: Rows[Vehicle], net: Ints, roads: RoadTable, seed: int
-    ) -> None:
+    def __init__(self, kinds: Sequence[str], vehicles: Rows[Vehicle], net: Ints, roads: RoadTable, seed: int) -> None:
         self._rows: dict[str, npt.NDArray[np.intp]] = {
             kind: np.array([b for b, own in enumerate(kinds) if own == kind]) for kind in dict.fromkeys(kinds)
         }

@@ -53,9 +53,7 @@ def measure(cases: int = CASES, file: Path = ROWS, worlds: Sequence[str] = tuple
         before = sum(own["before"] for own in found) / max(1, len(found))
         told = f"{small} of {len(found)} ({small / max(1, len(found)):.0%}), of {before:.1f} cars on average"
         bar = f">= {SHARE:.0%}"
-        rows.append(
-            Row(f"{world}: shrunk cases of at most {MOST} cars", told, bar, small >= SHARE * len(found))
-        )
+        rows.append(Row(f"{world}: shrunk cases of at most {MOST} cars", told, bar, small >= SHARE * len(found)))
         told = f"{len(least)} of {len(found)}"
         rows.append(
             Row(

@@ -94,9 +94,7 @@ def asked(board: Board, cells: list[int]) -> dict[str, Told]:
 def measure(games: int = GAMES) -> list[Row]:
     """Return the rows of this experiment."""
     rows: list[Row] = []
-    for entry in sorted(load_suite("synthesis-2026").model.games or (), key=lambda own: own.positions)[
-        :games
-    ]:
+    for entry in sorted(load_suite("synthesis-2026").model.games or (), key=lambda own: own.positions)[:games]:
         board = board_of(entry)
         if board.others + 1 > 2 * len(board.road_cells.nodes):
             rows.append(Row(entry.name, "no start without a queue: its order is no input", "", met=True))

@@ -31,9 +31,7 @@ def code(*files: Path) -> str:
     digest = hashlib.sha256()
     rooms = [PACKAGE / room for room in town().rooms(CORE)]
     folders = [*rooms, PACKAGE / "falsification"]
-    for path in sorted(
-        path for folder in folders for path in (*folder.rglob("*.py"), folder.with_suffix(".py"))
-    ):
+    for path in sorted(path for folder in folders for path in (*folder.rglob("*.py"), folder.with_suffix(".py"))):
         if path.exists():
             digest.update(path.relative_to(PACKAGE).as_posix().encode() + b"\0" + path.read_bytes())
     for path in files:
@@ -57,9 +55,7 @@ CLAIMS: Mapping[str, Claim] = {
         "task.md",
         "some minutes",
     ),
-    "lanes": Claim(
-        "`lanes` makes the rounds of free flow, alone and among wandering cars", "task.md", "some minutes"
-    ),
+    "lanes": Claim("`lanes` makes the rounds of free flow, alone and among wandering cars", "task.md", "some minutes"),
     "odd_egos": Claim(
         "no ego that is clean, however odd, brings a car that keeps the law to a breach of E1 to E6",
         "theory.md#on-the-road",

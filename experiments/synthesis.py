@@ -114,9 +114,7 @@ def measure() -> list[Row]:
 def _known(case: tuple[int, int, int, str, int, int, int, int], solution: Solution) -> Row:
     grid_rows, columns, others, assumed, degree, *expected = case
     found = [solution.game.positions, int(solution.winning.sum()), int(solution.vacuous.sum())]
-    name = (
-        f"{grid_rows}x{columns}, {others} cars, {assumed}, crossings from {degree}: positions, won, vacuous"
-    )
+    name = f"{grid_rows}x{columns}, {others} cars, {assumed}, crossings from {degree}: positions, won, vacuous"
     return Row(name, _numbers(found), _numbers(expected), found == expected)
 
 

@@ -160,9 +160,7 @@ def bars(drives: Sequence[Drive]) -> list[Row]:
         Row(f"of {sum(one.checked for one in drives)} moves unknown", str(unknown), "0", unknown == 0),
         Row("places in the order given up", str(events[NEW_TICKET]), "", True),
         Row("strategy left for want of a winning position", str(events[STRATEGY_LEFT]), "", True),
-        Row(
-            "time to begin, median and most", f"{statistics.median(begin):.2f} s, {begin[-1]:.2f} s", "", True
-        ),
+        Row("time to begin, median and most", f"{statistics.median(begin):.2f} s, {begin[-1]:.2f} s", "", True),
     ]
 
 

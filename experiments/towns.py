@@ -135,9 +135,7 @@ def _drawn(town: str, number: int, seconds: float, count: int, goes: str, **more
     return draw(load_config(configuration | more), SEED, number)
 
 
-def drive(
-    number: int, town: str, seconds: float = DURATION, drawn: Callable[..., Instance] = instance
-) -> Drive:
+def drive(number: int, town: str, seconds: float = DURATION, drawn: Callable[..., Instance] = instance) -> Drive:
     """Run `rules` on an instance."""
     own = drawn(town, number, seconds)
     score = run_trial(own, "rules").score

@@ -111,9 +111,7 @@ def case(number: int) -> tuple[dict[str, Any], str, str]:
         "version": 1,
         "problem_domain": "dubins_traffic",
         "network": network,
-        "e-agents": [
-            {"type": kind, "name": f"car{k}", "parameters": given} for k, (kind, given) in enumerate(agents)
-        ],
+        "e-agents": [{"type": kind, "name": f"car{k}", "parameters": given} for k, (kind, given) in enumerate(agents)],
         "duration": draw.choice((3.0, 8.5, 15.0)),
         "number_goals_bounds": [2, 4],
         "car": {} if plain else draw.choice(BODIES),

@@ -66,12 +66,8 @@ def main() -> int:
     """Do as the command line says; 1 if something is refuted that should hold, or a flaw passes."""
     parser = argparse.ArgumentParser(prog="python -m proofs")
     parser.add_argument("names", nargs="*", metavar="NAME", help="obligations; all unless named")
-    parser.add_argument(
-        "--flaws", action="store_true", help="plant flaws, too, each of which must be refuted"
-    )
-    parser.add_argument(
-        "--page", action="store_true", help="write the table of docs/proofs.md anew, and prove nothing"
-    )
+    parser.add_argument("--flaws", action="store_true", help="plant flaws, too, each of which must be refuted")
+    parser.add_argument("--page", action="store_true", help="write the table of docs/proofs.md anew, and prove nothing")
     asked = parser.parse_args()
     unknown = [name for name in asked.names if name not in OBLIGATIONS]
     if unknown:

@@ -89,9 +89,7 @@ class Meeting:
         """Return the gap at time u to where the other was at the beginning, and what is known of it (1.)."""
         gap, u = z3.Real("gap_then"), self.time.term
         shares = [z3.If(u >= z3.Q(k, 4), u - z3.Q(k, 4), z3.Q(k, 4) - u) for k in range(QUARTERS)]
-        return gap, [
-            gap >= own.term - self.own.term * share for own, share in zip(self.gaps, shares, strict=True)
-        ]
+        return gap, [gap >= own.term - self.own.term * share for own, share in zip(self.gaps, shares, strict=True)]
 
 
 @contextmanager
@@ -258,9 +256,7 @@ def no_obstacle_is_hit() -> int:
                 count += 1
                 if through.may(holds, gap <= 0, *known):
                     raise RefutedError("an obstacle is hit")
-                if through.may(
-                    holds, own.gaps[-1].term <= far, own.gaps[-1].term >= own.gaps[0].term - own.own.term
-                ):
+                if through.may(holds, own.gaps[-1].term <= far, own.gaps[-1].term >= own.gaps[0].term - own.own.term):
                     raise RefutedError("a tick ends nearer to an obstacle than the next one may begin")
     return count
 

@@ -18,9 +18,7 @@ from proofs.claims import Obligation
 from proofs.terms import replaced
 
 SHIELD: Final = "design/014-shield.md#on-straight-roads"
-ANY: Final = (
-    "every body, segment (straight or bent), disc and rate; roads 0.2 m wide and `turn_back` 2 cm at least"
-)
+ANY: Final = "every body, segment (straight or bent), disc and rate; roads 0.2 m wide and `turn_back` 2 cm at least"
 KEEPING: Final = "theory.md#kept-in-a-tick"
 STEPS: Final = ("move", "go_aside", "come_back", "fall_back", "goes_on")
 """The law's last step and what it calls, in `policies.rules.steering`."""
@@ -129,7 +127,7 @@ FLAWS: Final = (
     Flaw("lane", checks, "reach <= vehicle.over - BRINK", "reach <= vehicle.over + BRINK"),
     Flaw("memory", nearest_command, "lane != ego.last_lane or ", ""),
     Flaw("reach", safety, "travel += car.yaw_most * car.reach * car.period", "travel += car.yaw_most * car.period"),
-    Flaw("far", safety, "own == 0.0 or least > travel + GUARD", "own == 0.0 or least > 0.5 * travel"),
+    Flaw("far", safety, "driven == 0.0 or least > travel + GUARD", "driven == 0.0 or least > 0.5 * travel"),
     Flaw("far", safety, "for k in range(1, 5):", "for k in range(1, 3):"),
     Flaw("away", safety, "gone = 0.25 * k * stride + (travel - stride)", "gone = 0.0"),
     Flaw("away", safety, "for k in range(5):", "for k in range(4):"),

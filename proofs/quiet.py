@@ -165,9 +165,7 @@ class World:
     def traffic(self) -> Any:
         """What the shield is given."""
         drivers = SimpleNamespace(vehicle=[self.vehicle], net=[0])
-        return SimpleNamespace(
-            state=_state(self.before), labels=self.labels, roads=self.roads, drivers=drivers
-        )
+        return SimpleNamespace(state=_state(self.before), labels=self.labels, roads=self.roads, drivers=drivers)
 
     @property
     def shields(self) -> Any:
@@ -257,9 +255,7 @@ def geometry(world: World) -> dict[str, Any]:
         return Whole(found)
 
     def pair(first: Any, second: Any) -> Callable[..., tuple[Real, Real]]:
-        return lambda _r, _n, lane, x, y: tuple(
-            Real(f(whole_of(lane), x.term, y.term)) for f in (first, second)
-        )
+        return lambda _r, _n, lane, x, y: tuple(Real(f(whole_of(lane), x.term, y.term)) for f in (first, second))
 
     return {
         "nearest_segment": nearest_segment, "nearest_vertex": nearest_vertex, "vertex_distance2": vertex_distance2,

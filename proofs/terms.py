@@ -234,9 +234,7 @@ def greatest(*values: Any) -> Any:
 def _picked(first: Any, second: Any, better: Callable[[Any, Any], Any]) -> Any:
     if not isinstance(first, (Real, Whole)) and not isinstance(second, (Real, Whole)):
         return first if better(first, second) else second
-    kind, made = (
-        (Whole, whole_of) if isinstance(first, Whole) or isinstance(second, Whole) else (Real, real_of)
-    )
+    kind, made = (Whole, whole_of) if isinstance(first, Whole) or isinstance(second, Whole) else (Real, real_of)
     a, b = made(first), made(second)
     return kind(z3.If(better(a, b), a, b))
 

@@ -62,9 +62,7 @@ class Message:
 def messages(definition: str) -> list[Message]:
     """Return the structs of a definition, in order."""
     found: list[Message] = []
-    for comment, name, body in re.findall(
-        r"((?://[^\n]*\n)*)struct (\w+)\s*\{(.*?)\n\}", definition, re.DOTALL
-    ):
+    for comment, name, body in re.findall(r"((?://[^\n]*\n)*)struct (\w+)\s*\{(.*?)\n\}", definition, re.DOTALL):
         told = " ".join(line.removeprefix("//").strip() for line in comment.splitlines())
         statements = [part.strip() for part in re.sub(r"//[^\n]*", "", body).split(";") if part.strip()]
         constants: list[tuple[str, str]] = []
@@ -210,9 +208,7 @@ def _encoded(fields: tuple[Field, ...]) -> list[str]:
         field = run[0]
         if field.is_plain:
             codes = "".join(CODES[own.kind] for own in run)
-            lines.append(
-                f'buf.write(struct.pack(">{codes}", {", ".join(f"self.{own.name}" for own in run)}))'
-            )
+            lines.append(f'buf.write(struct.pack(">{codes}", {", ".join(f"self.{own.name}" for own in run)}))')
         elif not field.sizes:
             lines += _one_encoded(field, f"self.{field.name}")
         elif field.kind in NUMBERS and len(field.sizes) == 1:
@@ -258,9 +254,7 @@ def _decoded(fields: tuple[Field, ...]) -> list[str]:
             lines += [*before, f"self.{field.name} = {value}"]
         elif field.kind in NUMBERS and len(field.sizes) == 1:
             count, (code, size) = f"self.{field.sizes[0]}", NUMBERS[field.kind]
-            lines.append(
-                f"self.{field.name} = struct.unpack('>%d{code}' % {count}, buf.read({count} * {size}))"
-            )
+            lines.append(f"self.{field.name} = struct.unpack('>%d{code}' % {count}, buf.read({count} * {size}))")
         else:
             before, value = _one_decoded(field)
             lines += [f"self.{field.name} = []", f"for i0 in range(self.{field.sizes[0]}):"]
@@ -285,9 +279,7 @@ def make(folder: Path = ROOM / "dubins_traffic_lcm") -> None:
     """Write the modules into a folder, and take out what is none of them."""
     found = messages(DEFINITION.read_text(encoding="utf-8"))
     files = {f"{own.name}.py": module(own) for own in found}
-    files["__init__.py"] = (
-        HEAD + "\n" + "".join(f"from .{own.name} import {own.name} as {own.name}\n" for own in found)
-    )
+    files["__init__.py"] = HEAD + "\n" + "".join(f"from .{own.name} import {own.name} as {own.name}\n" for own in found)
     folder.mkdir(parents=True, exist_ok=True)
     for path in folder.glob("*.py"):
         if path.name not in files:

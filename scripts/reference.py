@@ -64,17 +64,13 @@ def renewed(page: str) -> str:
 def _part(name: str) -> str:
     match name:
         case "agents":
-            parts = [
-                f"**`{own.name}`**: {own.line}" + _more(own.remarks, own.parameters)
-                for own in catalogue.agents()
-            ]
+            parts = [f"**`{own.name}`**: {own.line}" + _more(own.remarks, own.parameters) for own in catalogue.agents()]
             return "\n\n".join(parts)
         case "rules":
             return "\n".join(_table(catalogue.rules()))
         case "competition":
             parts = [
-                f"### {heading}\n\n" + "\n".join(_table(rows, "key"))
-                for heading, rows in _competition_tables().items()
+                f"### {heading}\n\n" + "\n".join(_table(rows, "key")) for heading, rows in _competition_tables().items()
             ]
             return "\n\n".join(parts)
         case "configurations" | "controllers" | "simulators":

@@ -56,9 +56,7 @@ def schemas() -> dict[tuple[str, str], dict[str, Any]]:
         ("campaign", "campaign"): _with_configurations(CampaignModel, "campaign"),
         ("competition", "competition"): _with_configurations(CompetitionModel, "competition"),
         ("suites", "suite"): _with_configurations(SuiteModel, "suite"),
-        ("suites", "suite-result"): _complete(
-            ResultModel.model_json_schema(), "suite-result", "Results of a suite"
-        ),
+        ("suites", "suite-result"): _complete(ResultModel.model_json_schema(), "suite-result", "Results of a suite"),
     }
 
 
@@ -149,9 +147,7 @@ def _describe_parameters(definitions: dict[str, Any]) -> None:
         definitions.update(schema.pop("$defs", {}))
         definitions[f"Parameters of {kind}"] = schema
         names = [kind, *(name for name, ours in NAMES_2016.items() if ours == kind)]
-        reference: dict[str, Any] = {
-            "properties": {"parameters": {"$ref": f"#/$defs/Parameters%20of%20{kind}"}}
-        }
+        reference: dict[str, Any] = {"properties": {"parameters": {"$ref": f"#/$defs/Parameters%20of%20{kind}"}}}
         if schema.get("required"):
             reference["required"] = ["parameters"]
         rules.append(
@@ -182,9 +178,7 @@ def _complete(schema: dict[str, Any], name: str, title: str) -> dict[str, Any]:
 
 _DOCUMENTS: Mapping[str, Callable[[], dict[str, Any]]] = {
     "network": lambda: _complete(_road_network(), "network", "Road network description (RND)"),
-    "configuration": lambda: _versions(
-        "configuration", "Trials configuration", Settings0, Settings, [_ROADS_ONCE]
-    ),
+    "configuration": lambda: _versions("configuration", "Trials configuration", Settings0, Settings, [_ROADS_ONCE]),
     "instance": lambda: _versions("instance", "Problem instance", InstanceModel0, InstanceModel, []),
     "trial-data": _trial_data,
 }

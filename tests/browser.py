@@ -74,9 +74,7 @@ def faults(browser: webdriver.Chrome, *rules: str) -> list[str]:
         "const [asked, done] = arguments; axe.run(asked).then(r => done(r.violations))", asked
     )
     return [
-        f"{one['id']}: {one['nodes'][0]['html'][:200]}"
-        for one in found
-        if one["impact"] in ("serious", "critical")
+        f"{one['id']}: {one['nodes'][0]['html'][:200]}" for one in found if one["impact"] in ("serious", "critical")
     ]
 
 
@@ -94,6 +92,4 @@ def widen(browser: webdriver.Chrome, width: int, height: int = 800) -> None:
 
 def sideways(browser: webdriver.Chrome) -> int:
     """Return by how many pixels the page is wider than its window."""
-    return browser.execute_script(
-        "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
-    )
+    return browser.execute_script("return document.documentElement.scrollWidth - document.documentElement.clientWidth")

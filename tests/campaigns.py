@@ -88,9 +88,7 @@ def command(file: Path, folder: Path, *options: str) -> list[str]:
 
 def run(file: Path, folder: Path, *options: str) -> subprocess.CompletedProcess[str]:
     """Run a campaign to its end."""
-    return subprocess.run(
-        command(file, folder, *options), check=False, capture_output=True, text=True, timeout=600
-    )
+    return subprocess.run(command(file, folder, *options), check=False, capture_output=True, text=True, timeout=600)
 
 
 def succeed(file: Path, folder: Path, *options: str) -> bytes:

@@ -72,18 +72,14 @@ def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) ->
     report = yield
     if report.skipped and not hasattr(report, "wasxfail") and os.environ.get("CI") == "true":
         report.outcome, report.longrepr = "failed", f"left out, which CI=true forbids: {report.longrepr}"
-    if call.when == "teardown" and not any(
-        item.get_closest_marker(name) for name in ("tools", "long", "path")
-    ):
+    if call.when == "teardown" and not any(item.get_closest_marker(name) for name in ("tools", "long", "path")):
         report.user_properties.append((SPENT, _spent() - item.stash[_before]))
     return report
 
 
 def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     """Name the tests that take long without saying so."""
-    reports = [
-        one for some in terminalreporter.stats.values() for one in some if hasattr(one, "user_properties")
-    ]
+    reports = [one for some in terminalreporter.stats.values() for one in some if hasattr(one, "user_properties")]
     spent = {one.nodeid: value for one in reports for name, value in one.user_properties if name == SPENT}
     for name, seconds in sorted(spent.items(), key=lambda pair: -pair[1]):
         if seconds > LONG_S:

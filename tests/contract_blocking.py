@@ -88,9 +88,7 @@ def beside_obstacle(number: int) -> Made:
     stage, lane = _any_stage(number)
     stage.block(lane, 0.5 * stage.length(lane), radius=stage.dice.uniform(0.1, 0.2))
     back = stage.dice.choice((0.0, 0.29, 0.31))
-    return _blocked(
-        stage, lane, [("Swings", {"back": back}, stage.pose(lane ^ 1, 0.5 * stage.length(lane) + 0.1))]
-    )
+    return _blocked(stage, lane, [("Swings", {"back": back}, stage.pose(lane ^ 1, 0.5 * stage.length(lane) + 0.1))])
 
 
 def before_obstacle(number: int) -> Made:
@@ -98,9 +96,7 @@ def before_obstacle(number: int) -> Made:
     stage, lane = _any_stage(number)
     stage.block(lane, 0.5 * stage.length(lane) + 0.3, radius=stage.dice.uniform(0.1, 0.2))
     back = stage.dice.choice((0.0, 0.1, 0.2))
-    place = stage.pose(
-        lane, 0.5 * stage.length(lane) + 0.3 - 0.21 - stage.reach - stage.dice.uniform(0.0, 0.5)
-    )
+    place = stage.pose(lane, 0.5 * stage.length(lane) + 0.3 - 0.21 - stage.reach - stage.dice.uniform(0.0, 0.5))
     return _blocked(stage, lane, [("Swings", {"back": back}, place)])
 
 
@@ -154,9 +150,7 @@ def shuttle(number: int) -> Made:
     lane = stage.dice.choice((2, 3))
     wait = stage.dice.choice((0.0, 2.0, 4.5))
     inside = stage.dice.uniform(0.2, 0.7)
-    ends = [
-        (own, s) for own in (lane, lane ^ 1) for s in (RADIUS - inside, stage.length(lane) - RADIUS + inside)
-    ]
+    ends = [(own, s) for own in (lane, lane ^ 1) for s in (RADIUS - inside, stage.length(lane) - RADIUS + inside)]
     points = [(*stage.pose(own, s)[:2], wait * (k % 2)) for k, (own, s) in enumerate(ends)]
     own = {"gap": stage.dice.choice((0.3, 0.8)), "speed": stage.dice.choice((0.2, 0.7))}
     return _blocked(stage, lane, [

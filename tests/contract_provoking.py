@@ -80,9 +80,7 @@ def ego_closes_crossing(number: int) -> Made:
     lane = stage.lane_into(3)
     own = {"back": stage.dice.uniform(0.05, 0.29), "period": stage.dice.uniform(2.0, 20.0)}
     far = RADIUS + own["back"] + stage.dice.uniform(0.3, 1.1)
-    return _provoked(
-        stage, lane, stage.pose(stage.exit_of(lane), far), drivers.AsEgo(drivers.Swings(), **own), 6
-    )
+    return _provoked(stage, lane, stage.pose(stage.exit_of(lane), far), drivers.AsEgo(drivers.Swings(), **own), 6)
 
 
 def ego_tilted(number: int) -> Made:
@@ -118,9 +116,7 @@ def ego_slow(number: int) -> Made:
     """The ego keeps the law at a crawl."""
     stage, lane, _ = _bend_stage(number)
     own = {"speed": stage.dice.choice((0.03, 0.06, 0.12))}
-    return _provoked(
-        stage, lane, stage.pose(lane, 0.6 * stage.length(lane)), drivers.AsEgo(drivers.Slow(), **own)
-    )
+    return _provoked(stage, lane, stage.pose(lane, 0.6 * stage.length(lane)), drivers.AsEgo(drivers.Slow(), **own))
 
 
 def ego_swings(number: int) -> Made:
@@ -146,9 +142,7 @@ def ego_at_edge(number: int) -> Made:
 def ego_in_bend(number: int) -> Made:
     """The ego stands in a bend for ever."""
     stage, lane, out = _bend_stage(number)
-    place = stage.pose(
-        out, stage.dice.uniform(0.0, 1.1), stage.dice.uniform(-0.3, 0.3), stage.dice.uniform(-3.0, 3.0)
-    )
+    place = stage.pose(out, stage.dice.uniform(0.0, 1.1), stage.dice.uniform(-0.3, 0.3), stage.dice.uniform(-3.0, 3.0))
     return _provoked(stage, lane, place, drivers.AsEgo(drivers.Stands()))
 
 

@@ -60,9 +60,7 @@ def is_admitted(problem: Problem) -> bool:
     return True
 
 
-def trial(
-    name: str, number: int, seconds: float | None = None, disturbances: Disturbances | None = None
-) -> Came:
+def trial(name: str, number: int, seconds: float | None = None, disturbances: Disturbances | None = None) -> Came:
     """Run scene `name`, variation `number`, for as long as its bars need, or for `seconds`, perhaps disturbed."""
     instance, controller = SCENES[name](number)
     if disturbances is not None:
@@ -75,9 +73,7 @@ def trial(
     assert verdict is not None
     others = [one for one in verdict.violations if one.car != "ego"]
     fall = others[0].tick if others else math.inf
-    own = tuple(
-        f"{one.rule} {one.time:.2f}" for one in verdict.violations if one.car == "ego" and one.tick < fall
-    )
+    own = tuple(f"{one.rule} {one.time:.2f}" for one in verdict.violations if one.car == "ego" and one.tick < fall)
     end = others[0].time if others else result.ending.ticks / instance.problem.rate
     visits = [tick / instance.problem.rate for tick, _ in times.visits]
     marks = [0.0, *(time for time in visits if time < end), end]

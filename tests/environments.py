@@ -32,9 +32,7 @@ def vector(envs: int, config: Any = None, **given: Any) -> Any:
 
 def single(config: Any = None, **given: Any) -> Any:
     """Return one environment."""
-    return gymnasium.make(
-        "dubins_traffic/Traffic-v0", config=SHORT if config is None else config, **given
-    ).unwrapped
+    return gymnasium.make("dubins_traffic/Traffic-v0", config=SHORT if config is None else config, **given).unwrapped
 
 
 def weaving(step: int, env: int = 0) -> Any:

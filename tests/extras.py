@@ -44,9 +44,7 @@ def extras() -> list[str]:
 
 def _top(own: Distribution) -> Iterator[Path]:
     """The files and folders of a distribution that stand in the folder of packages."""
-    tops = {
-        Path(file).parts[0] for file in own.files or () if Path(file).parts[0] not in ("..", "__pycache__")
-    }
+    tops = {Path(file).parts[0] for file in own.files or () if Path(file).parts[0] not in ("..", "__pycache__")}
     for name in sorted(tops):
         yield Path(str(own.locate_file(name)))
 

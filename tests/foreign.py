@@ -181,10 +181,7 @@ def as_tulip() -> str:
             ]
             lines += [f'                output["ego_{bit}"] = {bool(target >> bit & 1)}' for bit in (0, 1)]
         lines += ["            else:", "                self._error(car1_0, car1_1)"]
-    return (
-        "\n".join([*lines, "        else:", "            raise AssertionError()", "        return output"])
-        + "\n"
-    )
+    return "\n".join([*lines, "        else:", "            raise AssertionError()", "        return output"]) + "\n"
 
 
 def files(folder: Path) -> dict[str, Path]:

@@ -38,9 +38,7 @@ WORLDS: Mapping[str, Mapping[str, Any]] = {
     "obstacle": {"obstacles": [{"disc": {"x": 4.0, "y": 0.3, "radius": 0.2}}]},
     "rectangles": {"car": {"w": 0.3, "body": {"rectangle": {"length": 0.45, "width": 0.3}}}},
     "laser": {"laser": True},
-    "formulas": {
-        "formulas": {"untouched": "[] !collision_ego", "back": "[] (left_ego -> <>[0,1] !left_ego)"}
-    },
+    "formulas": {"formulas": {"untouched": "[] !collision_ego", "back": "[] (left_ego -> <>[0,1] !left_ego)"}},
 }
 """What a trial may have beside."""
 

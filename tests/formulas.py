@@ -16,16 +16,10 @@ _BINARY = (Op.U, Op.R, Op.W, Op.M, Op.IMPLIES, Op.IFF, Op.AND, Op.OR, Op.AND, Op
 _PAST = (Op.Y, Op.Z, Op.O, Op.H, Op.S, Op.T)
 
 
-def drawn(
-    random: Random, depth: int, names: tuple[str, ...], *, past: bool, bounds: bool, longest: int = 3
-) -> Formula:
+def drawn(random: Random, depth: int, names: tuple[str, ...], *, past: bool, bounds: bool, longest: int = 3) -> Formula:
     """Return a random formula in which past operators range over past ones only."""
     if depth == 0 or random.random() < 0.1:
-        return (
-            make(Op.PROP, name=random.choice(names))
-            if random.random() < 0.95
-            else random.choice((TRUE, FALSE))
-        )
+        return make(Op.PROP, name=random.choice(names)) if random.random() < 0.95 else random.choice((TRUE, FALSE))
     if past and random.random() < 0.2:
         return drawn_past(random, depth, names)
 
@@ -203,12 +197,8 @@ def holds_finite(formula: Formula, word: list[int], names: tuple[str, ...], at: 
     if op is Op.H:
         return all(value(args[0], t) for t in range(at + 1))
     if op is Op.S:
-        return any(
-            value(args[1], t) and all(value(args[0], k) for k in range(t + 1, at + 1)) for t in range(at + 1)
-        )
-    return all(
-        value(args[1], t) or any(value(args[0], k) for k in range(t + 1, at + 1)) for t in range(at + 1)
-    )
+        return any(value(args[1], t) and all(value(args[0], k) for k in range(t + 1, at + 1)) for t in range(at + 1))
+    return all(value(args[1], t) or any(value(args[0], k) for k in range(t + 1, at + 1)) for t in range(at + 1))
 
 
 def named(*names: str) -> tuple[Formula, ...]:

@@ -53,9 +53,7 @@ class Reference:
     def _exits(self) -> dict[State, list[State]]:
         return {
             node: [
-                ("lane", node[1], point)
-                for point in self._neighbours[node[1]]
-                if len(node) == 2 or point != node[2]
+                ("lane", node[1], point) for point in self._neighbours[node[1]] if len(node) == 2 or point != node[2]
             ]
             for node in self._nodes.values()
         }

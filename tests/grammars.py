@@ -67,9 +67,7 @@ def tlsf_sections(text: str) -> dict[str, list[str]]:
     assert all(re.fullmatch(r"[a-z]\w*", name) for name in signals)
     for name in TLSF[2:]:
         for line in sections[name]:
-            assert Grammar(line, r"[a-z]\w*", r"!|X|[FG](?:\[\d+:\d+\])?", r"&&|\|\||->|<->|U|R").accepts(), (
-                line
-            )
+            assert Grammar(line, r"[a-z]\w*", r"!|X|[FG](?:\[\d+:\d+\])?", r"&&|\|\||->|<->|U|R").accepts(), line
             assert set(re.findall(r"[a-z]\w*", line)) <= set(signals), line
             temporal = set(re.findall(r"\b[XFGUR]\b", line))
             assert name in TLSF[6:] or temporal <= ({"X"} if name in TLSF[4:6] else set()), line

@@ -110,9 +110,7 @@ def run(command: Sequence[str], situation: str, *, user: int = 0) -> tuple[int, 
 
 def _emptied() -> str:
     """Return the steps that empty the folders in EMPTIED, but for what is needed."""
-    needed = [
-        own for own in sorted({ROOT, Path(sys.prefix)}) if any(own.is_relative_to(place) for place in EMPTIED)
-    ]
+    needed = [own for own in sorted({ROOT, Path(sys.prefix)}) if any(own.is_relative_to(place) for place in EMPTIED)]
     needed = [own for own in needed if not any(other in own.parents for other in needed)]
     steps = [f"mkdir /run/kept-{k} && mount --bind {own} /run/kept-{k}" for k, own in enumerate(needed)]
     steps += [f"mount -t tmpfs -o mode=1777 tmpfs {place}" for place in EMPTIED]

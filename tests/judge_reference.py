@@ -261,9 +261,7 @@ class Judge:
             return False
         body = self.problem.car.body
         long = body.length if isinstance(body, Rectangle) else 0.0
-        room = (1.5 if self.problem.network.bent[lane[0]] else 1.0) * (
-            long + 0.85 * self.rules.overtaking_behind
-        )
+        room = (1.5 if self.problem.network.bent[lane[0]] else 1.0) * (long + 0.85 * self.rules.overtaking_behind)
         returns = length - self.problem.intersection_radius - room
         if self.shut(lane, max(here, returns), here + reach):
             self.fired["obstacle by the disc"] += 1
@@ -410,9 +408,7 @@ class Judge:
 
     def assumption(self, n: int) -> Found:
         past, rules = self.past, self.rules
-        found = self.long(
-            "E3.enter", n, rules.enter_time, lambda k: past[k][n]["first"] and past[k][n]["clear"]
-        )
+        found = self.long("E3.enter", n, rules.enter_time, lambda k: past[k][n]["first"] and past[k][n]["clear"])
         found |= self.tickets(n)
         return found | self.owed[n]
 

@@ -64,9 +64,7 @@ def frames_of(script: Sequence[Frame], rate: float = 10.0, contacts: Sequence[Co
     zeros = [np.zeros(shape)] * 4
     none = [np.full(shape, -1, dtype=np.int64)] * 4
     columns = [np.ascontiguousarray(poses[:, :, k]) for k in range(4)]
-    return Frames(
-        0, rate, *columns, *zeros, *none, bits=np.zeros(shape, dtype=np.uint32), contacts=tuple(contacts)
-    )
+    return Frames(0, rate, *columns, *zeros, *none, bits=np.zeros(shape, dtype=np.uint32), contacts=tuple(contacts))
 
 
 def judged(instance: Instance, script: Sequence[Frame], contacts: Sequence[Contact] = ()) -> list[Breach]:

@@ -32,9 +32,7 @@ class Cluster:
         self.log = folder / "postgres.log"
 
     def command(self, name: str, *arguments: str) -> None:
-        drop = (
-            ("setpriv", f"--reuid={USER}", "--regid=nogroup", "--clear-groups") if os.geteuid() == 0 else ()
-        )
+        drop = ("setpriv", f"--reuid={USER}", "--regid=nogroup", "--clear-groups") if os.geteuid() == 0 else ()
         subprocess.run(
             [*drop, str(BINARIES / name), *arguments],
             check=True,
@@ -49,9 +47,7 @@ class Cluster:
         self.command("initdb", "-D", str(self._data), *options)
 
     def start(self) -> None:
-        options = (
-            f"-c listen_addresses=127.0.0.1 -c port={self._port} -c unix_socket_directories={self._folder}"
-        )
+        options = f"-c listen_addresses=127.0.0.1 -c port={self._port} -c unix_socket_directories={self._folder}"
         log = str(self.log)
         self.command("pg_ctl", "-D", str(self._data), "-w", "-t", "60", "-l", log, "-o", options, "start")
 

@@ -41,11 +41,7 @@ class RayCluster:
     def actors(self) -> list[int]:
         """Return the processes of the cluster that are actors."""
         parents = _parents()
-        return [
-            process
-            for process in parents
-            if self._process.pid in _line(process, parents) and _is_actor(process)
-        ]
+        return [process for process in parents if self._process.pid in _line(process, parents) and _is_actor(process)]
 
     def _tell(self, word: str) -> None:
         print(word, file=_there(self._process.stdin), flush=True)

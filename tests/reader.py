@@ -92,9 +92,7 @@ class Reader:
         elif block.file is not None:
             (self.folder / block.file).write_text(code)
         elif block.output:
-            assert as_shown(block.code, self.said) == [], (
-                f"line {block.line}: shown, and not said:\n{self.said}"
-            )
+            assert as_shown(block.code, self.said) == [], f"line {block.line}: shown, and not said:\n{self.said}"
         elif block.runs:
             self.run(block, code)
         if "then all ends" in block.marks:

@@ -74,10 +74,7 @@ def random_frames(instance: Instance, seed: int, count: int, spread: float = 3.0
     reals = {name: draw.normal(size=(count, cars)) for name in REALS}
     reals |= {"x": walk[..., 0], "y": walk[..., 1], "c": np.cos(angle), "s": np.sin(angle)}
     reals["speed"][draw.random((count, cars)) < 0.3] = 0.0
-    whole = {
-        name: np.repeat(draw.integers(-1, 17, size=(count // 7 + 1, cars)), 7, axis=0)[:count]
-        for name in WHOLE
-    }
+    whole = {name: np.repeat(draw.integers(-1, 17, size=(count // 7 + 1, cars)), 7, axis=0)[:count] for name in WHOLE}
     bits = np.repeat(draw.integers(0, 2**32, size=(count // 5 + 1, cars), dtype=np.uint32), 5, axis=0)[:count]
     contacts: list[Contact] = []
     for tick in sorted(draw.integers(1, count, size=min(4, count - 1)).tolist()):

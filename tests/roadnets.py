@@ -67,9 +67,7 @@ def winding(seed: int, most: int = 2) -> RoadNetwork:
         segments.append(tuple(WINDING * number for number in ends))
         corners.append(_winding(segments[-1], dice))
     transform = dice.uniform(-1e3, 1e3), dice.uniform(-1e3, 1e3), dice.uniform(-7.0, 7.0)
-    return RoadNetwork(
-        tuple(segments), dice.choice((1.0, 1.25)), transform, extent(segments), {}, tuple(corners)
-    )
+    return RoadNetwork(tuple(segments), dice.choice((1.0, 1.25)), transform, extent(segments), {}, tuple(corners))
 
 
 def _winding(row: tuple[float, ...], dice: Random) -> tuple[tuple[float, float, float], ...]:
@@ -91,10 +89,6 @@ def _winding(row: tuple[float, ...], dice: Random) -> tuple[tuple[float, float, 
             radii.append(room / half * (1.0 if dice.random() < 0.3 else dice.uniform(0.5, 1.0)))
             free[k + 1] -= radii[-1] * half
         turned = max(abs(phase(side / step)) for side in (sides[0], sides[-1]))
-        if (
-            turned < _TURNED
-            and all(_LEAST <= radius <= 1e3 for radius in radii)
-            and max(halves, default=0.0) < 1.0
-        ):
+        if turned < _TURNED and all(_LEAST <= radius <= 1e3 for radius in radii) and max(halves, default=0.0) < 1.0:
             return tuple((p.real, p.imag, r) for p, r in zip(points[1:-1], radii, strict=True))
     return ()

@@ -28,12 +28,7 @@ def lacking(network: RoadNetwork) -> list[str]:
             if hypot(x1 - x0, y1 - y0) < min(straight, line.length) - PLAY:
                 found.append(f"{s} bends near an end")
     corners = network.corners or ()
-    found += [
-        f"corner of {s}"
-        for s, own in enumerate(corners)
-        for each in own
-        if each[2] * network.length < 3.0 * W
-    ]
+    found += [f"corner of {s}" for s, own in enumerate(corners) for each in own if each[2] * network.length < 3.0 * W]
     for v, u in combinations(range(len(network.points)), 2):
         if hypot(*(network.points[v] - network.points[u])) < 2.0 * (R + RHO):
             found.append(f"{v} and {u} are close")

@@ -93,16 +93,12 @@ class Graph:
     def client(self, *actions: str) -> subprocess.Popen[str]:
         """Start the client of tests/ros_client.py."""
         generated = self.client_messages()
-        return self.start(
-            [SYSTEM_PYTHON, ROOT / "tests" / "ros_client.py", *actions], PYTHONPATH=str(generated)
-        )
+        return self.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_client.py", *actions], PYTHONPATH=str(generated))
 
     def world(self, fault: str = "none", cars: Sequence[str] = CARS) -> subprocess.Popen[str]:
         """Start the world of tests/ros_world.py, by default with the ego and a car `agent0`."""
         generated = self.client_messages()
-        return self.start(
-            [SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", fault, *cars], PYTHONPATH=str(generated)
-        )
+        return self.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_world.py", fault, *cars], PYTHONPATH=str(generated))
 
     def client_messages(self) -> Path:
         """Return where our messages are for the system's Python."""

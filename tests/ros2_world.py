@@ -15,9 +15,7 @@ from cars_outside import Cars
 cars = Cars(*sys.argv[1:])
 rclpy.init()
 node = rclpy.create_node("world")
-trackers = [
-    node.create_publisher(PoseStamped, f"/{name}/pose", qos_profile_sensor_data) for name in cars.names
-]
+trackers = [node.create_publisher(PoseStamped, f"/{name}/pose", qos_profile_sensor_data) for name in cars.names]
 
 
 def take(name, message):

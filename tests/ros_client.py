@@ -43,9 +43,7 @@ class Client:
         self.states, self.active, self.sent = 0, False, 0
         self.action, self.limit = "drive", 10**9
         self.names, self.ego, self.paused = [], None, {}
-        self.out = rospy.Publisher(
-            "/ego/mobile_base/commands/velocity", Twist, queue_size=100, tcp_nodelay=True
-        )
+        self.out = rospy.Publisher("/ego/mobile_base/commands/velocity", Twist, queue_size=100, tcp_nodelay=True)
         rospy.Subscriber("/dubins_traffic_maestro/probleminstance_JSON", ProblemInstanceJSON, self.problem)
         rospy.Subscriber("/loutput", LabelStamped, self.label)
         rospy.Subscriber("/ego/odom", Odometry, self.odom)

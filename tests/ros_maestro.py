@@ -39,9 +39,7 @@ class Maestro:
 
     def draw(self):
         rows, columns = self.rnd["shape"]
-        goals = [
-            [random.randrange(columns), random.randrange(rows)] for _ in range(random.randint(*self.goals))
-        ]
+        goals = [[random.randrange(columns), random.randrange(rows)] for _ in range(random.randint(*self.goals))]
         return {"version": 0, "goals": goals, "rnd": self.rnd, "intersection_radius": 1.0}
 
     def answer(self, request):

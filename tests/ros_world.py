@@ -28,9 +28,7 @@ while not rospy.is_shutdown():
         pose.orientation.z, pose.orientation.w = z, w
         poses.append(pose)
     if poses:
-        out.publish(
-            ModelStates(["ground_plane", *cars.names], [Pose(), *poses], [Twist()] * (1 + len(poses)))
-        )
+        out.publish(ModelStates(["ground_plane", *cars.names], [Pose(), *poses], [Twist()] * (1 + len(poses))))
     for tracker, pose in zip(trackers, poses, strict=False):
         tracker.publish(PoseStamped(pose=pose))
     cars.pause()

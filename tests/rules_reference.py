@@ -400,8 +400,6 @@ class Reference:
         car.moved |= {other.number for other in self.cars if not other.facts["still"]}
         far = 2.0 * self.problem.car.body.reach + self.rules["overtaking_behind"]
         near = {
-            other.number
-            for other in self.cars
-            if other is not car and math.dist(car.pose[:2], other.pose[:2]) <= far
+            other.number for other in self.cars if other is not car and math.dist(car.pose[:2], other.pose[:2]) <= far
         }
         car.facts["hemmed"] = car.left and car.overtaking and bool(near & car.moved)

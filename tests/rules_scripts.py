@@ -74,9 +74,7 @@ def flags(found: Sequence[Labels], n: int, b: int = 0) -> list[set[str]]:
     return [set(names(int(labels.bits[b, n]))) for labels in found]
 
 
-def on_lane(
-    network: RoadNetwork, lane: int, s: float, lateral: float, back: bool = False
-) -> tuple[float, ...]:
+def on_lane(network: RoadNetwork, lane: int, s: float, lateral: float, back: bool = False) -> tuple[float, ...]:
     """Return the pose at (s, lateral) of a lane, headed along it, or against it."""
     segment, direction = divmod(lane, 2)
     sign = -1.0 if back else 1.0
@@ -85,9 +83,7 @@ def on_lane(
         s = 0.0
     else:
         a, b = (network.points[v] for v in network.ends[segment])
-        start, (tx, ty) = (
-            (a, network.tangents[segment]) if direction == 0 else (b, -network.tangents[segment])
-        )
+        start, (tx, ty) = (a, network.tangents[segment]) if direction == 0 else (b, -network.tangents[segment])
     x, y = start[0] + s * tx - lateral * ty, start[1] + s * ty + lateral * tx
     return float(x), float(y), float(sign * tx), float(sign * ty)
 

@@ -57,9 +57,7 @@ def kept_whole(folder: Path, settings: str, place: str) -> None:
     assert {name.rpartition("/")[2] for name in names if name.startswith("replays")} == set(replays)
 
 
-def launched(
-    service: Service, token: str, name: str, folder: Path, *arguments: str
-) -> subprocess.Popen[bytes]:
+def launched(service: Service, token: str, name: str, folder: Path, *arguments: str) -> subprocess.Popen[bytes]:
     """Start a worker as one on another machine would be."""
     command = [sys.executable, "-m", "dubins_traffic.cli", "worker", service.url, "--name", name]
     command += ["--folder", str(folder / name), "--trust-submissions", *arguments]

@@ -127,9 +127,7 @@ def started_over_ros2(reader: Reader) -> None:
     """Begin a session over DDS, and what asks it for READY and START and drives nothing."""
     beside("dubins-traffic ros2 run demo --records smallest-ros2", "waiting for READY")(reader)
     asking = "from controller import Controller; Controller.drive = lambda *_: None; Controller().spin()"
-    reader.follow(
-        Block("sh", f"PYTHONPATH=examples/ros2:${{PYTHONPATH:-}} python -c '{asking}'\n", 0, "beside; ended")
-    )
+    reader.follow(Block("sh", f"PYTHONPATH=examples/ros2:${{PYTHONPATH:-}} python -c '{asking}'\n", 0, "beside; ended"))
 
 
 def entries(folder: Path) -> None:
@@ -137,6 +135,4 @@ def entries(folder: Path) -> None:
     (folder / "entries").mkdir()
     for name, speed in (("ada", 0.1), ("bob", 0.0)):
         with ZipFile(folder / "entries" / f"{name}.zip", "w") as archive:
-            archive.writestr(
-                "controller.py", DRIVER.format("Controller").replace("0.1, 0.0", f"{speed}, 0.0")
-            )
+            archive.writestr("controller.py", DRIVER.format("Controller").replace("0.1, 0.0", f"{speed}, 0.0"))

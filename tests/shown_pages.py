@@ -94,9 +94,7 @@ FEW = dumps(
         },
     }
 )
-GAMES = loads(
-    (files_of("dubins_traffic.suites") / "data" / "synthesis-2026.json").read_text(encoding="utf-8")
-)
+GAMES = loads((files_of("dubins_traffic.suites") / "data" / "synthesis-2026.json").read_text(encoding="utf-8"))
 ONE_GAME = dumps({**GAMES, "name": "one", "games": GAMES["games"][:1]})
 
 PAGES: dict[str, Page] = {
@@ -109,9 +107,7 @@ PAGES: dict[str, Page] = {
             "/usr/bin/python3 smallest.py": beside(
                 "dubins-traffic ros1 run demo --master --records smallest-ros", "waiting for READY"
             ),
-            "from lcm import LCM": beside(
-                "dubins-traffic lcm run demo --lockstep --records smallest-lcm", "begins"
-            ),
+            "from lcm import LCM": beside("dubins-traffic lcm run demo --lockstep --records smallest-lcm", "begins"),
             "from dubins_traffic.transports.ros2 import": started_over_ros2,
         },
     ),

@@ -50,9 +50,7 @@ class Shuttle:
         if self._has_to_stop(pose):
             self._stood += 1
             return 0.0, 0.0
-        return (bounds.speed if abs(error) < 0.4 else 0.0), max(
-            -bounds.yaw_rate, min(bounds.yaw_rate, 4.0 * error)
-        )
+        return (bounds.speed if abs(error) < 0.4 else 0.0), max(-bounds.yaw_rate, min(bounds.yaw_rate, 4.0 * error))
 
     def _has_to_stop(self, pose: Any) -> bool:
         """Tell whether the car is close before a crossing and has not stood there for a second."""

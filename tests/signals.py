@@ -52,9 +52,7 @@ def stated(instance: Instance) -> dict[Key, Formula]:
     found: dict[Key, Formula] = {}
     for formula in (*spec.assumptions, *spec.guarantees):
         ((rule, match),) = [
-            (rule, match)
-            for form, rule in _FORMS.items()
-            if (match := re.fullmatch(form, str(formula))) is not None
+            (rule, match) for form, rule in _FORMS.items() if (match := re.fullmatch(form, str(formula))) is not None
         ]
         name, *point = match.groups()
         vertex = instance.problem.network.vertex((int(point[0]), int(point[1]))) if point else NONE
@@ -85,9 +83,7 @@ def judged(
     return found, {key: VERDICTS[verdict] for key, verdict in zip(formulas, last, strict=True)}
 
 
-def first_breaches(
-    instance: Instance, formulas: Mapping[Key, Formula], breaches: Sequence[Breach]
-) -> dict[Key, int]:
+def first_breaches(instance: Instance, formulas: Mapping[Key, Formula], breaches: Sequence[Breach]) -> dict[Key, int]:
     """Return at which frame the referee first says that each of the rules is broken."""
     found: dict[Key, int] = {}
     for breach in breaches:
@@ -98,9 +94,7 @@ def first_breaches(
     rules, rate = RuleParameters.from_mapping(instance.problem.rules), instance.problem.rate
     for rule, car, _ in formulas:
         if rule == "E1":
-            fall = first_fall(
-                [one for one in breaches if one.car == car and one.rule[0] in "23"], rules, rate
-            )
+            fall = first_fall([one for one in breaches if one.car == car and one.rule[0] in "23"], rules, rate)
             if fall is not None:
                 found[rule, car, NONE] = fall[1].tick
     return found

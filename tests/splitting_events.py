@@ -95,9 +95,7 @@ def traffic() -> tuple[Traffic, ...]:
     )
 
 
-def _nudged(
-    arms: Sequence[tuple[str, list[float]]], kind: str, parameters: dict[str, Any]
-) -> list[dict[str, Any]]:
+def _nudged(arms: Sequence[tuple[str, list[float]]], kind: str, parameters: dict[str, Any]) -> list[dict[str, Any]]:
     """Return e-agents of a kind with much noise on their speeds, with their names and starts."""
     own = {"kind": kind, "parameters": parameters, "speed_noise": 0.9, "delay": 1}
     return [{"type": "nudged", "name": name, "start": start, "parameters": own} for name, start in arms]
@@ -136,18 +134,14 @@ def count(own: Traffic, trials: int) -> list[int]:
             company.reseed(drawn)
         company.advance(company.group.instances[0].ticks)
         margins, done = company.margins(), done + begun * shared
-        happened = [
-            before + int((margins <= below).sum()) for before, below in zip(happened, own.below, strict=True)
-        ]
+        happened = [before + int((margins <= below).sum()) for before, below in zip(happened, own.below, strict=True)]
         print(f"{own.name}: {happened} of {done}", file=sys.stderr)
     return happened
 
 
 def estimates(own: Traffic, below: float, seeds: Sequence[int]) -> list[Replicas]:
     """Return for each seed what `estimate` gives on an event with 10 runs of 50 particles."""
-    instances = [
-        drawn for seed in seeds for drawn in draw_many(own.configuration, seed, range(RUNS * PARTICLES))
-    ]
+    instances = [drawn for seed in seeds for drawn in draw_many(own.configuration, seed, range(RUNS * PARTICLES))]
     dice = [np.random.default_rng([STREAM, seed, run, 1]) for seed in seeds for run in range(RUNS)]
     runs = split(instances, own.begin, below, dice)
     return [combined(runs[k : k + RUNS], PARTICLES) for k in range(0, len(runs), RUNS)]

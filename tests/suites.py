@@ -49,9 +49,7 @@ def cases(number: int = 3, **changes: Any) -> dict[str, Any]:
     """Return the document of a suite of cases, with `changes`."""
     town = document()["campaign"]["configurations"][0]["document"]
     instances = [draw(load_config(town), 3, trial) for trial in range(number)]
-    entries = [
-        {"name": f"case-{k}", "document": instance_to_document(one)} for k, one in enumerate(instances)
-    ]
+    entries = [{"name": f"case-{k}", "document": instance_to_document(one)} for k, one in enumerate(instances)]
     return {"version": 0, "name": "small-cases", "title": "Small", "cases": entries, **changes}
 
 

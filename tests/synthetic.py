@@ -86,9 +86,7 @@ def driven(instance: Instance) -> tuple[Instance, Frames]:
         contacts=_contacts(places, instance.problem.rate),
         events=(Event(frames // 3, "command_lost", 0), Event(frames // 2, "note", detail="half of the time")),
     )
-    starts = tuple(
-        Pose(*(float(a[0, car]) for a in (block.x, block.y, block.c, block.s))) for car in range(count)
-    )
+    starts = tuple(Pose(*(float(a[0, car]) for a in (block.x, block.y, block.c, block.s))) for car in range(count))
     fields = {name: getattr(instance, name) for name in Instance.__slots__} | {"starts": starts}
     return Instance(**fields), block
 
@@ -120,9 +118,7 @@ def _track(network: RoadNetwork, car: int, frames: int, rate: float) -> np.ndarr
     way = np.array(corners)
     along = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way, axis=0).T))])
     s = np.arange(frames) * SPEED / rate + 0.6
-    x, y = (
-        np.mean([np.interp(s + d, along, w) for d in np.linspace(-0.25, 0.25, 11)], axis=0) for w in way.T
-    )
+    x, y = (np.mean([np.interp(s + d, along, w) for d in np.linspace(-0.25, 0.25, 11)], axis=0) for w in way.T)
     theta = np.arctan2(np.gradient(y), np.gradient(x)) if frames > 1 else np.zeros(1)
     return np.stack([x, y, theta], axis=1)
 
@@ -136,9 +132,7 @@ def _contacts(places: np.ndarray, rate: float) -> tuple[Contact, ...]:
             for frame in np.flatnonzero(near[1:] & ~near[:-1]) + 1:
                 x, y = places[frame, [car, other]].mean(axis=0)
                 sides = ((0.5, 0.5), (True, True), (car == 0, True))
-                found.append(
-                    Contact(int(frame), frame / rate, car, other, float(x), float(y), 1.0, 0.0, *sides)
-                )
+                found.append(Contact(int(frame), frame / rate, car, other, float(x), float(y), 1.0, 0.0, *sides))
     return tuple(sorted(found, key=lambda contact: contact.time))
 
 

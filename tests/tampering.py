@@ -39,9 +39,7 @@ def rebuilt(data: bytes, change: Callable[[Chunks], object], *, finish: bool = T
 
 def find(chunks: Chunks, topic: str, nth: int = 0) -> tuple[int, int]:
     """Return chunk and place of the nth message on a topic."""
-    places = [
-        (m, k) for m, chunk in enumerate(chunks) for k, entry in enumerate(chunk) if entry.topic == topic
-    ]
+    places = [(m, k) for m, chunk in enumerate(chunks) for k, entry in enumerate(chunk) if entry.topic == topic]
     return places[nth]
 
 

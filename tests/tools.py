@@ -173,10 +173,7 @@ def solvers() -> Iterator[Solvers]:
 
 @cache
 def _starts(path: str) -> bool:
-    return (
-        subprocess.run([path, "--version"], check=False, capture_output=True, timeout=PATIENCE_S).returncode
-        == 0
-    )
+    return subprocess.run([path, "--version"], check=False, capture_output=True, timeout=PATIENCE_S).returncode == 0
 
 
 def _found(path: str, name: str) -> str:

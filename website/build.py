@@ -28,9 +28,7 @@ def main() -> int:
         The exit status: 0 if there was no warning.
     """
     parser = ArgumentParser(description="Build the site of the documentation; warnings are errors.")
-    parser.add_argument(
-        "folder", nargs="?", type=Path, default=ROOT / "build" / "site", help="where to put it"
-    )
+    parser.add_argument("folder", nargs="?", type=Path, default=ROOT / "build" / "site", help="where to put it")
     folder = parser.parse_args().folder
     with TemporaryDirectory() as given:
         source, extra = Path(given) / "source", Path(given) / "extra"

@@ -24,9 +24,7 @@ PAGE = re.compile(r"\bdocs/([\w/-]+)\.md(?!#)")
 
 def write_command_line(path: Path) -> None:
     """Write a section for each command."""
-    sections = [
-        _section(name, command) for name, command in _leaves(typer.main.get_command(app), "dubins-traffic")
-    ]
+    sections = [_section(name, command) for name, command in _leaves(typer.main.get_command(app), "dubins-traffic")]
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("\n".join([HEAD, *sections]), encoding="utf-8")
 

@@ -48,8 +48,7 @@ def write_gallery(page: Path, folder: Path) -> None:
         _replay(case, folder / name, thumbnails / thumbnail)
         picture = f'<img src="thumbnails/{thumbnail}" alt="" width="{WIDTH}" loading="lazy">'
         rows.append(
-            f'| <a href="gallery/{name}">{picture}<br>{case["name"]}</a> | {case["says"]} | '
-            f"`{case['controller']}` |"
+            f'| <a href="gallery/{name}">{picture}<br>{case["name"]}</a> | {case["says"]} | `{case["controller"]}` |'
         )
     table = ["| trial | what happens | controller |", "|---|---|---|", *rows, ""]
     page.write_text("\n".join([HEAD, *table]), encoding="utf-8")

@@ -42,9 +42,7 @@ def gather(source: Path) -> None:
     for given, name in OTHERS.items():
         if given != "docs/index.md":
             _write(source, ROOT / given, name, listings)
-    shutil.copytree(
-        DOCS / "pictures", source / "pictures", ignore=shutil.ignore_patterns("*.py", "__pycache__")
-    )
+    shutil.copytree(DOCS / "pictures", source / "pictures", ignore=shutil.ignore_patterns("*.py", "__pycache__"))
     for path in sorted(listings):
         _write_listing(source, path)
     _write_index(source)
@@ -53,9 +51,7 @@ def gather(source: Path) -> None:
 def _write(source: Path, path: Path, name: str, listings: set[Path]) -> None:
     text = MARK.sub("", path.read_text(encoding="utf-8"))
     parts = FENCE.split(text)
-    made = "".join(
-        part if n % 2 else _linked(_anchored(part), path, name, listings) for n, part in enumerate(parts)
-    )
+    made = "".join(part if n % 2 else _linked(_anchored(part), path, name, listings) for n, part in enumerate(parts))
     if name in TITLES:
         made = re.sub(r"\A# .*", f"# {TITLES[name]}", made)
     if name.removesuffix(".md") not in SHOWN:
@@ -109,9 +105,7 @@ def _place(target: Path, listings: set[Path]) -> str | None:
 
 def _contents(names: tuple[str, ...], caption: str) -> str:
     pages = [f"{LABELS[name]} <{name}>" if name in LABELS else name for name in names]
-    return "\n".join(
-        ["```{toctree}", ":maxdepth: 1", ":hidden:", f":caption: {caption}", "", *pages, "```", ""]
-    )
+    return "\n".join(["```{toctree}", ":maxdepth: 1", ":hidden:", f":caption: {caption}", "", *pages, "```", ""])
 
 
 def _write_listing(source: Path, path: Path) -> None:

@@ -27,9 +27,7 @@ class World:
         self.cars = cars
         self.crossing = cars <= 8
         name, count = (
-            ("intersection-v0", "initial_vehicle_count")
-            if self.crossing
-            else ("highway-v0", "vehicles_count")
+            ("intersection-v0", "initial_vehicle_count") if self.crossing else ("highway-v0", "vehicles_count")
         )
         config = {
             "simulation_frequency": RATE,

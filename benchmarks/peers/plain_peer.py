@@ -29,9 +29,7 @@ class World:
 
     def tick(self) -> None:
         """Move every car along its arc, and count the pairs that overlap."""
-        self.poses = [
-            advance(pose, *command) for pose, command in zip(self.poses, self.commands, strict=True)
-        ]
+        self.poses = [advance(pose, *command) for pose, command in zip(self.poses, self.commands, strict=True)]
         limit = (2.0 * RADIUS) ** 2
         for n, (x, y, _) in enumerate(self.poses):
             for other in self.poses[:n]:

@@ -97,9 +97,7 @@ def rooms() -> str:
     for place in (134, 520, 910):
         parts += [arrow((place, 81), (place, 102)), arrow((place, low - 38), (place, low - 2))]
     parts += [arrow((254, 190), (268, 190)), arrow((770, 190), (784, 190))]
-    return picture(
-        1080, low + 34 + 33 * len(pairs) + 14, "The buildings and their rooms; imports only go down", parts
-    )
+    return picture(1080, low + 34 + 33 * len(pairs) + 14, "The buildings and their rooms; imports only go down", parts)
 
 
 def flow() -> str:

@@ -394,7 +394,5 @@ def main(folder: Path, suffix: str = ".svg") -> None:
 
 if __name__ == "__main__":
     parser = ArgumentParser(description="Draw the pictures of docs/task.md.")
-    parser.add_argument(
-        "folder", nargs="?", type=Path, default=Path(__file__).parent, help="where to draw them"
-    )
+    parser.add_argument("folder", nargs="?", type=Path, default=Path(__file__).parent, help="where to draw them")
     main(parser.parse_args().folder)

@@ -151,9 +151,7 @@ class Panel:
 
     def disc(self) -> None:
         """Draw the outline of the crossing's disc."""
-        self.axes.add_patch(
-            Circle((0, 0), R, fill=False, edgecolor=INK, linewidth=1.1, linestyle="--", zorder=3)
-        )
+        self.axes.add_patch(Circle((0, 0), R, fill=False, edgecolor=INK, linewidth=1.1, linestyle="--", zorder=3))
 
     def approach(self, *bearings: float) -> None:
         """Shade where the front of a body may be to approach, with the edge of the disc as the stop line."""
@@ -169,17 +167,13 @@ class Panel:
             self.axes.add_patch(Polygon(shape, closed=True, facecolor="#F0E442", alpha=0.75, zorder=2.2))
             self.line(arcs[0], INK, width=2.6)
 
-    def line(
-        self, points: Any, colour: str, *, width: float = 1.6, style: str = "-", order: float = 4
-    ) -> None:
+    def line(self, points: Any, colour: str, *, width: float = 1.6, style: str = "-", order: float = 4) -> None:
         """Draw a line through points."""
         rows = np.asarray(points, dtype=float)
         look: dict[str, Any] = {"color": colour, "linewidth": width, "linestyle": style, "zorder": order}
         self.axes.add_line(Line2D(rows[:, 0], rows[:, 1], solid_capstyle="round", **look))
 
-    def arrow(
-        self, points: Sequence[Point], colour: str = INK, *, width: float = 1.8, style: str = "-"
-    ) -> None:
+    def arrow(self, points: Sequence[Point], colour: str = INK, *, width: float = 1.8, style: str = "-") -> None:
         """Draw a way through points, with a head at its end."""
         if len(points) > 2:
             self.line(points[:-1], colour, width=width, style=style, order=7)

@@ -49,9 +49,7 @@ class GridMap:
                     segments.append([x, y, x, y + 1])
                 elif mark != " " and not (mark == "+" and place == (0, 0)):
                     where = f"line {len(lines) - row + 1}, column {column + 1}"
-                    raise dt.InputError(
-                        "not part of a drawing", file=file, field=where, value=mark, expected="+ - |"
-                    )
+                    raise dt.InputError("not part of a drawing", file=file, field=where, value=mark, expected="+ - |")
         return {"version": 0, "length": length, "segments": segments}
 
     def write(self, document: Mapping[str, Any]) -> str:
@@ -59,26 +57,14 @@ class GridMap:
         if document["version"] != 0:
             raise dt.InputError("can't be drawn", file=self.name, expected="straight roads on a lattice")
         if others := document.keys() - {"version", "length", "transform", "shape", "segments"}:
-            raise dt.InputError(
-                "can't be drawn", file=self.name, value=sorted(others), expected="no other keys"
-            )
+            raise dt.InputError("can't be drawn", file=self.name, value=sorted(others), expected="no other keys")
         segments: list[list[int]] = document["segments"]
         left, low = min(min(a, c) for a, _, c, _ in segments), min(min(b, d) for _, b, _, d in segments)
-        if (
-            any(abs(a - c) + abs(b - d) != 1 for a, b, c, d in segments)
-            or any(document["transform"])
-            or left
-            or low
-        ):
-            raise dt.InputError(
-                "can't be drawn", file=self.name, expected="an unmoved grid whose corner is 0, 0"
-            )
+        if any(abs(a - c) + abs(b - d) != 1 for a, b, c, d in segments) or any(document["transform"]) or left or low:
+            raise dt.InputError("can't be drawn", file=self.name, expected="an unmoved grid whose corner is 0, 0")
         rows, columns = document["shape"]
         page = [[" "] * (2 * columns - 1) for _ in range(2 * rows - 1)]
         for a, b, c, d in segments:
             page[2 * b][2 * a] = page[2 * d][2 * c] = "+"
             page[b + d][a + c] = "-" if b == d else "|"
-        return (
-            "\n".join([f"grid-map {document['length']}", *("".join(row).rstrip() for row in page[::-1])])
-            + "\n"
-        )
+        return "\n".join([f"grid-map {document['length']}", *("".join(row).rstrip() for row in page[::-1])]) + "\n"

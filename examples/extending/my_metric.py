@@ -23,9 +23,7 @@ class Turning:
             -1,
             meaning="mean of |speed * yaw rate| over the frames",
         ),
-        dt.Column(
-            "sideways_max", "sideways, largest", "m/s2", -1, meaning="largest |speed * yaw rate| at a frame"
-        ),
+        dt.Column("sideways_max", "sideways, largest", "m/s2", -1, meaning="largest |speed * yaw rate| at a frame"),
     )
 
     def begin(self, instance: dt.Instance) -> None:  # noqa: ARG002  # it needs nothing of the problem

@@ -145,9 +145,5 @@ ENTRY = TransportEntry(
     line="Trials over UDP datagrams on this machine.",
     about="Run trials whose ego, or some of whose e-agents, are driven by datagrams.",
     examples=("datagrams run demo --lockstep --port 7412",),
-    options=(
-        Option(
-            "--port", int, "Where to listen; 0: any free one.", default=0, metavar="PORT", low=0, high=65535
-        ),
-    ),
+    options=(Option("--port", int, "Where to listen; 0: any free one.", default=0, metavar="PORT", low=0, high=65535),),
 )

@@ -100,8 +100,7 @@ def train(ego: str, generations: int, seed: int) -> Floats:
         gain = (paid[:, 0] - paid[:, 1]) / (paid.std() + 1e-6)
         weights = weights + RATE * SPREAD * np.einsum("p,pij->ij", gain, noise) / np.sqrt(PAIRS)
         told = ", ".join(
-            f"{name} {count:.2f}"
-            for name, count in zip(ASSUMPTIONS, found["broken"].mean(axis=0), strict=True)
+            f"{name} {count:.2f}" for name, count in zip(ASSUMPTIONS, found["broken"].mean(axis=0), strict=True)
         )
         print(
             f"{generation:3d}: paid {paid.mean():6.2f}, visits {found['visits'].mean():.2f}; broken a trial: {told}",
@@ -126,9 +125,7 @@ def compare(ego: str, weights: Floats, seed: int, trials: int) -> None:
 
 def main() -> None:
     """Train and compare."""
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--ego", default="lanes")
     parser.add_argument("--generations", type=int, default=20)
     parser.add_argument("--trials", type=int, default=96)

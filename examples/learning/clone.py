@@ -106,9 +106,7 @@ def slopes(layers: Layers, seen: np.ndarray, wanted: np.ndarray) -> tuple[Layers
     return found[::-1], entropy
 
 
-def fitted(
-    layers: Layers, seen: np.ndarray, wanted: np.ndarray, epochs: int, chance: Any
-) -> tuple[Layers, float]:
+def fitted(layers: Layers, seen: np.ndarray, wanted: np.ndarray, epochs: int, chance: Any) -> tuple[Layers, float]:
     """Return the layers after Adam has lessened the cross-entropy, and that of the last batch."""
     flat = [array for layer in layers for array in layer]
     first, second = [np.zeros_like(one) for one in flat], [np.zeros_like(one) for one in flat]
@@ -118,9 +116,7 @@ def fitted(
         order = chance.permutation(len(seen))
         for start in range(0, len(seen), BATCH):
             rows = order[start : start + BATCH]
-            by_layer, entropy = slopes(
-                list(zip(flat[::2], flat[1::2], strict=True)), seen[rows], wanted[rows]
-            )
+            by_layer, entropy = slopes(list(zip(flat[::2], flat[1::2], strict=True)), seen[rows], wanted[rows])
             steps += 1
             for k, slope in enumerate(array for layer in by_layer for array in layer):
                 first[k] = 0.9 * first[k] + 0.1 * slope
@@ -149,8 +145,7 @@ def learn(rounds: int, first: int, later: int, epochs: int, jobs: int = 2) -> tu
             print(f"round {number}: {len(seen)} frames, cross-entropy {entropy:.3f}", flush=True)
             if number < rounds:
                 tasks = [
-                    (100_000 * (number + 1) + trial, policy_of(layers), 0.5 * 0.7**number)
-                    for trial in range(later)
+                    (100_000 * (number + 1) + trial, policy_of(layers), 0.5 * 0.7**number) for trial in range(later)
                 ]
                 lessons += pool.map(taught, tasks)
     return policy_of(layers), entropies
@@ -158,6 +153,4 @@ def learn(rounds: int, first: int, later: int, epochs: int, jobs: int = 2) -> tu
 
 if __name__ == "__main__":
     learned, _ = learn(ROUNDS, FIRST, LATER, EPOCHS)
-    learned.save(
-        Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "junction.npz", overwrite=True
-    )
+    learned.save(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "junction.npz", overwrite=True)

@@ -66,9 +66,7 @@ LESSONS = {
 """`district` has no rules but not to collide; in `town` all are judged."""
 
 
-def returns(
-    env: gymnasium.vector.VectorEnv, lesson: Lesson, weights: np.ndarray, generation: int
-) -> np.ndarray:
+def returns(env: gymnasium.vector.VectorEnv, lesson: Lesson, weights: np.ndarray, generation: int) -> np.ndarray:
     """Return what each policy is rewarded with in an episode of its own environment; two by two the same episode."""
     hidden, hidden_bias, out, out_bias = lesson.layers(weights)
     seeds = [SEED + k // 2 for k in range(len(weights))]

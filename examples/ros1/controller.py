@@ -27,9 +27,7 @@ class Controller:
         self.labels = []
         self.idle = threading.Event()
         self.idle.set()
-        self.commands = rospy.Publisher(
-            "/ego/mobile_base/commands/velocity", Twist, queue_size=10, tcp_nodelay=True
-        )
+        self.commands = rospy.Publisher("/ego/mobile_base/commands/velocity", Twist, queue_size=10, tcp_nodelay=True)
         self.mode = rospy.ServiceProxy("/dubins_traffic_maestro/mode", MMode)
         rospy.Subscriber("/dubins_traffic_maestro/probleminstance_JSON", ProblemInstanceJSON, self.begin)
         rospy.Subscriber("/loutput", LabelStamped, self.look)
@@ -45,9 +43,7 @@ class Controller:
         length, (tx, ty, theta) = problem["rnd"]["length"], problem["rnd"]["transform"]
         c, s = math.cos(theta), math.sin(theta)
         self.radius, self.next = problem["intersection_radius"], 0
-        self.goals = [
-            (length * (c * x - s * y) + tx, length * (s * x + c * y) + ty) for x, y in problem["goals"]
-        ]
+        self.goals = [(length * (c * x - s * y) + tx, length * (s * x + c * y) + ty) for x, y in problem["goals"]]
 
     def look(self, message):
         """Note which labels hold."""

@@ -42,9 +42,7 @@ class Controller:
             length, (tx, ty, theta) = problem["rnd"]["length"], problem["rnd"]["transform"]
             c, s = math.cos(theta), math.sin(theta)
             self.radius = problem["intersection_radius"]
-            self.goals = [
-                (length * (c * x - s * y) + tx, length * (s * x + c * y) + ty) for x, y in problem["goals"]
-            ]
+            self.goals = [(length * (c * x - s * y) + tx, length * (s * x + c * y) + ty) for x, y in problem["goals"]]
 
     def answered(self, message):
         """Start the trial that is ready."""

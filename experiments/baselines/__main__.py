@@ -17,13 +17,9 @@ from experiments.baselines.methods import METHODS
 def main() -> int:
     """Measure the named methods, and write the page."""
     parser = argparse.ArgumentParser(prog="experiments.baselines")
-    parser.add_argument(
-        "methods", nargs="*", metavar="METHOD", choices=[*METHODS, []], help=", ".join(METHODS)
-    )
+    parser.add_argument("methods", nargs="*", metavar="METHOD", choices=[*METHODS, []], help=", ".join(METHODS))
     parser.add_argument("--suites", default=",".join(SUITES), metavar="NAME,...")
-    parser.add_argument(
-        "--record", nargs=3, metavar=("SUITE", "K", "FILE"), help="trial K of those that are run"
-    )
+    parser.add_argument("--record", nargs=3, metavar=("SUITE", "K", "FILE"), help="trial K of those that are run")
     parser.add_argument("--shield", action="store_true", help="under the shield")
     parser.add_argument("--failures", action="store_true", help="find what each fails at, and draw it")
     parser.add_argument("--page", action="store_true", help="write the page from what is stored")

@@ -65,9 +65,7 @@ def find() -> None:
         field.set_axis_off()
     with tempfile.TemporaryDirectory() as folder:
         for field, (name, own) in zip(fields.flat, drawn.items(), strict=False):
-            record, breach, sentence = seen_again(
-                name, own["rule"], own["trial"], Path(folder) / f"{name}.mcap"
-            )
+            record, breach, sentence = seen_again(name, own["rule"], own["trial"], Path(folder) / f"{name}.mcap")
             own |= {"time": breach.time, "says": sentence}
             draw(field, record, breach.tick)
             field.set_title(f"{METHODS[name].title.replace('`', '')}: {own['rule']}", fontsize=7)

@@ -91,7 +91,5 @@ def stored() -> dict[str, dict[str, Any]]:
     """Return what is stored of each method that has been measured, by suite."""
     found = {name: RESULTS / f"{name}.json" for name in METHODS}
     return {
-        name: json.loads(file.read_text(encoding="utf-8"))["suites"]
-        for name, file in found.items()
-        if file.exists()
+        name: json.loads(file.read_text(encoding="utf-8"))["suites"] for name, file in found.items() if file.exists()
     }

@@ -50,8 +50,7 @@ def page() -> str:
     known = stored()
     lines = [HEAD, "| method | what it does | it needs |", "|---|---|---|"]
     lines += [
-        f"| {METHODS[name].title} | {METHODS[name].says} | {METHODS[name].needs or 'nothing'} |"
-        for name in known
+        f"| {METHODS[name].title} | {METHODS[name].says} | {METHODS[name].needs or 'nothing'} |" for name in known
     ]
     lines += [
         "",
@@ -123,10 +122,7 @@ def _section(suite: str, known: Mapping[str, Mapping[str, Any]]) -> Iterator[str
     for name, own in entries.items():
         for way, words in WAYS.items():
             columns = own[way]["columns"]
-            cells = [
-                _mean(columns[key])
-                for key in ("counted_rounds", "rounds_before_breach", "collisions", *broken)
-            ]
+            cells = [_mean(columns[key]) for key in ("counted_rounds", "rounds_before_breach", "collisions", *broken)]
             seconds = own[way]["seconds"]
             cells.append(f"{1e3 * seconds:.2g}" if seconds else "")
             yield f"| {METHODS[name].title}{words} | {' | '.join(cells)} |"
@@ -140,11 +136,7 @@ def _says(entries: Mapping[str, Mapping[str, Any]]) -> str:
     """Return what the numbers of a suite come to, in sentences."""
     best = _best(entries)
     words = f"Most counted rounds: {', '.join(best[:3])}. {_ties(entries)}"
-    idle = [
-        METHODS[name].title
-        for name, own in entries.items()
-        if not any(own["alone"]["columns"]["counted_rounds"])
-    ]
+    idle = [METHODS[name].title for name, own in entries.items() if not any(own["alone"]["columns"]["counted_rounds"])]
     if idle:
         words += f" Alone without a counted round: {', '.join(idle)}."
     most: dict[str, list[str]] = {}
@@ -220,9 +212,7 @@ def draw() -> None:
             ]
             colour = f"C{k}" if k < 10 else MORE_COLOURS[k - 10]
             field.plot(*zip(*points, strict=True), color=colour, linewidth=0.6, alpha=0.5)
-            field.plot(
-                *points[0], "o", color=colour, markersize=5, label=METHODS[name].title.replace("`", "")
-            )
+            field.plot(*points[0], "o", color=colour, markersize=5, label=METHODS[name].title.replace("`", ""))
             field.plot(*points[1], "s", color=colour, markersize=5, markerfacecolor="none")
         field.set_xscale("symlog", linthresh=0.1)
         field.set_xlim(left=-0.02)

@@ -117,11 +117,7 @@ _PARTS = {
     "e-agents": {"counter": "synthesis.counter_team:CounterTeam"},
 }
 """What rooms above a registry add to it, by name: a module, and a class in it; map formats in the order of asking."""
-_NAMES = {
-    entry.partition("=")[0]: (place, entry.rpartition("=")[2])
-    for place in _PLACES
-    for entry in _PLACES[place]
-}
+_NAMES = {entry.partition("=")[0]: (place, entry.rpartition("=")[2]) for place in _PLACES for entry in _PLACES[place]}
 
 __version__: str
 

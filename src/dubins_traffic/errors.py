@@ -89,9 +89,7 @@ class InputError(DubinsTrafficError):
         if field:
             joint = "" if path is None or path.startswith("[") else "."
             path = field if path is None else f"{field}{joint}{path}"
-        return InputError(
-            self.problem, file=self.file or file, field=path, value=self.value, expected=self.expected
-        )
+        return InputError(self.problem, file=self.file or file, field=path, value=self.value, expected=self.expected)
 
     def __str__(self) -> str:
         return self._text(in_python)

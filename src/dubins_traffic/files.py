@@ -19,9 +19,7 @@ from dubins_traffic.errors import DubinsTrafficError, InputError
 try:
     import fcntl
 except ImportError as error:
-    raise DubinsTrafficError(
-        "this system has no locks for files (fcntl): Linux or macOS is needed"
-    ) from error
+    raise DubinsTrafficError("this system has no locks for files (fcntl): Linux or macOS is needed") from error
 
 STANDARD = "-"
 MOST_BYTES = 1 << 28
@@ -255,9 +253,9 @@ def require_output(
     if is_stream(target):
         return
     require_place(target)
-    for own in dict.fromkeys((target, Path(os.path.realpath(target)))):
-        if not own.name.lower().endswith(tuple(suffixes)):
-            value = own.suffix if own == target else f"a link to {own}"
+    for place in dict.fromkeys((target, Path(os.path.realpath(target)))):
+        if not place.name.lower().endswith(tuple(suffixes)):
+            value = place.suffix if place == target else f"a link to {place}"
             expected = f"a name that ends in {', '.join(suffixes)}"
             raise InputError(f"not a name of {what}", file=name, value=value, expected=expected)
     for other in apart_from:

@@ -122,7 +122,10 @@ def of_packages(group: str) -> dict[str, Callable[[], Any]]:
     """Return the classes that other packages offer as entry points of a group, by name; it takes some milliseconds."""
     from importlib.metadata import entry_points
 
-    return {entry.name: entry.load() for entry in sorted(entry_points(group=group), key=lambda own: own.name)}
+    return {
+        entry.name: entry.load()
+        for entry in sorted(entry_points(group=group), key=lambda entry_point: entry_point.name)
+    }
 
 
 def make(maker: Callable[[], Any], spec: str, seam: Seam) -> Any:
@@ -150,9 +153,7 @@ def make(maker: Callable[[], Any], spec: str, seam: Seam) -> Any:
         ) from error
     for method in seam.methods:
         if not callable(getattr(made, method, None)):
-            raise seam.refuse(
-                f"{name} is not a {seam.name}: it lacks the method {method}", spec, seam.signature
-            )
+            raise seam.refuse(f"{name} is not a {seam.name}: it lacks the method {method}", spec, seam.signature)
     return made
 
 
@@ -215,8 +216,8 @@ def _load_module(place: str, spec: str, seam: Seam) -> ModuleType:
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        own = error.name if isinstance(error, ModuleNotFoundError) else None
-        if own is not None and (place == own or place.startswith(own + ".")):
+        missing = error.name if isinstance(error, ModuleNotFoundError) else None
+        if missing is not None and (place == missing or place.startswith(missing + ".")):
             problem, expected = f"no module {place}", "module:Class that can be imported from here"
         else:
             problem, expected = (

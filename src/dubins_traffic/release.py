@@ -76,11 +76,7 @@ def _resolved(folder: Path, head: str) -> str | None:
     if name == head:
         return head
     common = folder / "commondir"
-    places = (
-        [folder, (folder / common.read_text(encoding="utf-8").strip()).resolve()]
-        if common.exists()
-        else [folder]
-    )
+    places = [folder, (folder / common.read_text(encoding="utf-8").strip()).resolve()] if common.exists() else [folder]
     for place in places:
         if (place / name).is_file():
             return (place / name).read_text(encoding="ascii").strip()

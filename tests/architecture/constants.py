@@ -28,9 +28,7 @@ def compiled() -> Iterator[tuple[str, ast.FunctionDef]]:
             yield module.name, kernel
         for part in module.tree.body:
             match part:
-                case ast.Assign(value=ast.Call(func=ast.Name(id=name), args=[ast.Name(id=own)])) if (
-                    name in JIT
-                ):
+                case ast.Assign(value=ast.Call(func=ast.Name(id=name), args=[ast.Name(id=own)])) if name in JIT:
                     yield _function(*defined(module.name, own))
                 case _:
                     pass
@@ -62,9 +60,7 @@ def defined(module: str, name: str) -> tuple[str, str]:
 
 
 def _function(module: str, name: str) -> tuple[str, ast.FunctionDef]:
-    (found,) = (
-        part for part in _named(module).tree.body if isinstance(part, ast.FunctionDef) and part.name == name
-    )
+    (found,) = (part for part in _named(module).tree.body if isinstance(part, ast.FunctionDef) and part.name == name)
     return module, found
 
 

@@ -32,9 +32,7 @@ def without_docstring() -> Findings:
 
 def is_overload(item: ast.AST) -> bool:
     """Whether a function is there for its types alone."""
-    return any(
-        isinstance(own, ast.Name) and own.id == "overload" for own in getattr(item, "decorator_list", ())
-    )
+    return any(isinstance(own, ast.Name) and own.id == "overload" for own in getattr(item, "decorator_list", ()))
 
 
 def is_at_top(module: Module, item: ast.AST) -> bool:
@@ -102,9 +100,7 @@ def _components(imports: Mapping[str, set[str]]) -> list[list[str]]:
 
     reach = {name: reached(name) for name in imports}
     groups = {
-        tuple(sorted(other for other in reach[name] if name in reach[other]))
-        for name in imports
-        if name in reach[name]
+        tuple(sorted(other for other in reach[name] if name in reach[other])) for name in imports if name in reach[name]
     }
     return [list(group) for group in sorted(groups) if len(group) > 1]
 

@@ -75,9 +75,7 @@ def main() -> int:
         for key in new:
             print(f"{what}: {key}: {found[key]}{'' if add else ' (to be mended)'}", file=sys.stderr)
         kept = [key for key in found if key in known[what] or add]
-        known[what] = {
-            key: _lesser(known[what].get(key, found[key]), found[key], add) for key in sorted(kept)
-        }
+        known[what] = {key: _lesser(known[what].get(key, found[key]), found[key], add) for key in sorted(kept)}
         print(f"{what}: {len(known[what])} left")
     STILL.write_text(json.dumps(known, indent=1, sort_keys=True) + "\n", encoding="utf-8")
     return 0

@@ -95,9 +95,7 @@ def common_parameters(room: str) -> frozenset[tuple[str, str]]:
 @cache
 def table_types() -> frozenset[str]:
     """Return the names of the package's classes that say what their fields are: tables, and rows of tables."""
-    classes = [
-        item for module in modules() for item in module.definitions() if isinstance(item, ast.ClassDef)
-    ]
+    classes = [item for module in modules() for item in module.definitions() if isinstance(item, ast.ClassDef)]
     found = {"Rows"} | {item.name for item in classes if _says_its_fields(item)}
     return frozenset(found | {item.name for item in classes if _fields(item) and _fields(item) <= found})
 
@@ -116,8 +114,6 @@ def _says_its_fields(item: ast.ClassDef) -> bool:
     body = item.body
     fields = [k for k, part in enumerate(body) if isinstance(part, ast.AnnAssign)]
     return bool(fields) and all(
-        k + 1 < len(body)
-        and isinstance(body[k + 1], ast.Expr)
-        and isinstance(body[k + 1].value, ast.Constant)
+        k + 1 < len(body) and isinstance(body[k + 1], ast.Expr) and isinstance(body[k + 1].value, ast.Constant)
         for k in fields
     )

@@ -7,9 +7,7 @@ import pytest
 from dubins_traffic.service.texts import templates
 from tests.architecture.house import PACKAGE, modules
 
-MARKUP = re.compile(
-    r"</?(html|head|body|table|t[hdr]|div|section|h[1-6]|p|ul|li|a href)\b[^>]*>", re.IGNORECASE
-)
+MARKUP = re.compile(r"</?(html|head|body|table|t[hdr]|div|section|h[1-6]|p|ul|li|a href)\b[^>]*>", re.IGNORECASE)
 
 
 def test_no_module_holds_markup() -> None:

@@ -20,9 +20,7 @@ MARKS = ("tools", "long")
 def parts() -> dict[str, str]:
     """Return the arguments of pytest in `make test` and `make test-tools`."""
     text = (ROOT / "Makefile").read_text(encoding="utf-8")
-    recipes = {
-        name: re.search(rf"^{name}:.*\n((?:\t.*\n)+)", text, re.MULTILINE) for name in ("test", "test-tools")
-    }
+    recipes = {name: re.search(rf"^{name}:.*\n((?:\t.*\n)+)", text, re.MULTILINE) for name in ("test", "test-tools")}
     return {
         name: " ".join(re.findall(r"python -m pytest (.*)", found[1]))
         for name, found in recipes.items()

@@ -41,9 +41,7 @@ def docstring_at(place: str) -> str | None:
 
 def _below(node: ast.AST, names: list[str]) -> str | None:
     if not names:
-        return (
-            ast.get_docstring(node) if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) else None
-        )
+        return ast.get_docstring(node) if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef) else None
     body: list[ast.stmt] = getattr(node, "body", [])
     for part, after in zip(body, [*body[1:], None], strict=True):
         if getattr(part, "name", None) == names[0]:

@@ -46,9 +46,7 @@ class Trace:
 
     def returns(self) -> list[str]:
         """Return the pairs of rooms of which the lower one calls the higher one, each with a call."""
-        found = {
-            tuple(name.partition(".")[0] for name in pair): " -> ".join(pair) for pair in sorted(self.upward)
-        }
+        found = {tuple(name.partition(".")[0] for name in pair): " -> ".join(pair) for pair in sorted(self.upward)}
         return sorted(found.values())
 
 

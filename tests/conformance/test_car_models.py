@@ -173,9 +173,7 @@ def test_a_car_is_where_a_fine_integration_of_its_arcs_leads(model: str) -> None
 
             if seconds > 0.0:
                 place = solve_ivp(flow, (0.0, seconds), place, rtol=1e-11, atol=1e-12).y[:, -1].tolist()
-        assert rows[tick + 1] == pytest.approx(
-            [place[0], place[1], math.cos(place[2]), math.sin(place[2])], abs=1e-8
-        )
+        assert rows[tick + 1] == pytest.approx([place[0], place[1], math.cos(place[2]), math.sin(place[2])], abs=1e-8)
 
 
 def test_a_command_held_twice_as_long_leads_where_two_ticks_do(model: str) -> None:
@@ -210,9 +208,7 @@ def test_interpreted_it_writes_the_same_record(model: str, tmp_path: Path) -> No
             str(out),
         ]
         env = {**os.environ, "NUMBA_DISABLE_JIT": switch}
-        subprocess.run(
-            [sys.executable, "-m", "dubins_traffic.cli", *command], env=env, check=True, timeout=600
-        )
+        subprocess.run([sys.executable, "-m", "dubins_traffic.cli", *command], env=env, check=True, timeout=600)
         found.append((out / "trial-0000.mcap").read_bytes())
     assert found[0] == found[1]
 
@@ -291,9 +287,7 @@ class Halves:
 def test_contacts_of_later_parts_know_of_the_tick(tmp_path: Path) -> None:
     """One car drives in the first half of a tick; the other hits it in the second, when it stands."""
     (tmp_path / "halves.py").write_text(HALVES)
-    (tmp_path / "late.py").write_text(
-        HALVES.replace("(speed, 0.0, self.half), (0.0", "(0.0, 0.0, self.half), (speed")
-    )
+    (tmp_path / "late.py").write_text(HALVES.replace("(speed, 0.0, self.half), (0.0", "(0.0, 0.0, self.half), (speed"))
     late = HALVES.replace("[(speed, 0.0, self.half), (0.0, 0.0, self.half)]", "self.arcs(speed)") + (
         "    def arcs(self, speed):\n"
         "        still, go = (0.0, 0.0, self.half), (speed, 0.0, self.half)\n"
@@ -406,9 +400,7 @@ def test_what_is_no_car_model_is_refused(spec: str, words: str) -> None:
         (("return [(", "return 5, [("), "advance gave 5; expected 3 finite numbers"),
     ],
 )
-def test_what_a_model_gets_wrong_ends_its_trial_by_name(
-    change: tuple[str, str], words: str, tmp_path: Path
-) -> None:
+def test_what_a_model_gets_wrong_ends_its_trial_by_name(change: tuple[str, str], words: str, tmp_path: Path) -> None:
     (tmp_path / "bad.py").write_text(TWIN.replace(*change))
     spec, record = f"{tmp_path / 'bad.py'}:Twin", tmp_path / "a.mcap"
     ending = run_trial(draw(drawn(spec, **{"e-agents": []}), SEED, 0), "lanes", record=record).ending

@@ -67,9 +67,7 @@ def entries(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
     return [own] if request.param == "counter" else [own, TOGETHER]
 
 
-def test_alone_in_a_batch_and_from_a_record_it_does_the_same(
-    entries: list[dict[str, Any]], tmp_path: Path
-) -> None:
+def test_alone_in_a_batch_and_from_a_record_it_does_the_same(entries: list[dict[str, Any]], tmp_path: Path) -> None:
     drawn = configuration(**{"e-agents": entries, "number_trials": 2, "duration_bounds": [2, 4]})
     together = run_batch(drawn, "rules", trials=2, seed=SEED)
     for trial, outcome in enumerate(together.outcomes):
@@ -147,9 +145,7 @@ def test_what_a_strangers_record_names_is_not_called_unless_it_is_a_driver() -> 
             run_trial(draw(drawn, SEED, 0), "simple")
 
 
-@pytest.mark.parametrize(
-    "act", ["1 / 0", "return None", "return 1", "return float('nan'), 0.0", "return 'ab', 'cd'"]
-)
+@pytest.mark.parametrize("act", ["1 / 0", "return None", "return 1", "return float('nan'), 0.0", "return 'ab', 'cd'"])
 def test_what_it_raises_ends_the_trial_as_its_fault_and_verifies(act: str, tmp_path: Path) -> None:
     ending, record = _run(BODY.format(begin="pass", act=act), {}, tmp_path)
     assert (ending.end, ending.ticks) == (End.AGENT_FAULT, 0)

@@ -132,9 +132,7 @@ def bare(text: str) -> str:
     for part in ast.walk(tree):
         if isinstance(part, ast.Module | ast.ClassDef | ast.FunctionDef):
             part.body = [
-                own
-                for own in part.body
-                if not (isinstance(own, ast.Expr) and isinstance(own.value, ast.Constant))
+                own for own in part.body if not (isinstance(own, ast.Expr) and isinstance(own.value, ast.Constant))
             ]
     return ast.unparse(tree)
 
@@ -152,11 +150,7 @@ def test_our_code_of_the_messages_does_what_that_of_lcm_gen_does(tmp_path: Path)
         lcm_messages.DEFINITION,
     ]
     subprocess.run(command, check=True, capture_output=True)
-    theirs = {
-        path.name: bare(path.read_text())
-        for path in tmp_path.rglob("*.py")
-        if path.parent.name.endswith("_lcm")
-    }
+    theirs = {path.name: bare(path.read_text()) for path in tmp_path.rglob("*.py") if path.parent.name.endswith("_lcm")}
     lcm_messages.make(tmp_path / "ours")
     assert {path.name: bare(path.read_text()) for path in (tmp_path / "ours").iterdir()} == theirs
     assert len(theirs) == 10

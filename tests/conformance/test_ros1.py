@@ -53,9 +53,7 @@ class Ros1Peer(RosPeer):
             ("/ego/odom", m.Odometry, self.move),
             ("/dubins_traffic_maestro/probleminstance_JSON", m.ProblemInstanceJSON, self.learn),
         )
-        self.ears = [
-            self.rospy.Subscriber(topic, kind, take, tcp_nodelay=True) for topic, kind, take in topics
-        ]
+        self.ears = [self.rospy.Subscriber(topic, kind, take, tcp_nodelay=True) for topic, kind, take in topics]
         topic = f"/{self.car}/mobile_base/commands/velocity"
         self.commands = self.rospy.Publisher(topic, m.Twist, queue_size=100, tcp_nodelay=True)
 

@@ -87,9 +87,7 @@ class TestStdio(UntypedConformance):
         ],
     )
     def test_what_is_no_command_of_two_plain_numbers_and_a_tick_that_was_shown(self, line: bytes) -> None:
-        result = self.run(
-            answer(until=2, then=lambda peer: peer.socket.sendall(line + b"\n")), Lockstep(30.0)
-        )
+        result = self.run(answer(until=2, then=lambda peer: peer.socket.sendall(line + b"\n")), Lockstep(30.0))
         assert result.ending.end is End.PEER_GARBAGE
         assert "not a message" in result.ending.detail
 

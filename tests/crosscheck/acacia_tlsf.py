@@ -23,8 +23,7 @@ def all_of(formulas: list[str]) -> str:
 def formula_of(found: dict[str, list[str]]) -> str:
     """Return what a document of strict semantics says, as one formula (Jacobs, Pérez and Schlehuber-Caissier, 2023)."""
     first, own, step, answer, assumed, wanted = (
-        all_of(found.get(name, []))
-        for name in ("INITIALLY", "PRESET", "REQUIRE", "ASSERT", "ASSUME", "GUARANTEE")
+        all_of(found.get(name, [])) for name in ("INITIALLY", "PRESET", "REQUIRE", "ASSERT", "ASSUME", "GUARANTEE")
     )
     steps = f"(({answer}) W !({step}))"
     return f"({first}) -> (({own}) && {steps} && ((G ({step}) && {assumed}) -> ({wanted})))"

@@ -17,17 +17,12 @@ def metres(line: np.ndarray) -> float:
     return float(np.hypot(*np.diff(line, axis=0).T).sum())
 
 
-ends = {
-    lanelet.lanelet_id: (lanelet.left_vertices[0], lanelet.left_vertices[-1]) for lanelet in network.lanelets
-}
+ends = {lanelet.lanelet_id: (lanelet.left_vertices[0], lanelet.left_vertices[-1]) for lanelet in network.lanelets}
 found = {
     "junctions": sorted(
-        ends[next(iter(own.incomings)).incoming_lanelets.copy().pop()][1].tolist()
-        for own in network.intersections
+        ends[next(iter(own.incomings)).incoming_lanelets.copy().pop()][1].tolist() for own in network.intersections
     ),
-    "signs": sorted(
-        str(own.traffic_sign_elements[0].traffic_sign_element_id) for own in network.traffic_signs
-    ),
+    "signs": sorted(str(own.traffic_sign_elements[0].traffic_sign_element_id) for own in network.traffic_signs),
     "lanes": sorted(
         [
             *lanelet.left_vertices[0].tolist(),

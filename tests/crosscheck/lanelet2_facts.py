@@ -17,7 +17,5 @@ for lanelet in found_map.laneletLayer:
     metres = sum(hypot(x - u, y - v) for (x, y), (u, v) in zip(points, points[1:]))  # noqa: B905, RUF007
     rows.append([*points[0], *points[-1], metres])
 stops = [own for own in found_map.regulatoryElementLayer if isinstance(own, AllWayStop)]
-stopping = [
-    [lanelet.leftBound[-1].x, lanelet.leftBound[-1].y] for own in stops for lanelet in own.lanelets()[:1]
-]
+stopping = [[lanelet.leftBound[-1].x, lanelet.leftBound[-1].y] for own in stops for lanelet in own.lanelets()[:1]]
 print(json.dumps({"errors": list(errors), "lanes": sorted(rows), "junctions": sorted(stopping)}))

@@ -36,8 +36,6 @@ def ran(*arguments: str) -> str:
     """Return what the Python that has Stable-Baselines3 prints."""
     program = ROOT / "build" / "crosscheck" / "learners" / "bin" / "python"
     around = {**os.environ, "PYTHONPATH": f"{ROOT / 'src'}{os.pathsep}{ROOT}"}
-    done = subprocess.run(
-        [program, *arguments], env=around, cwd=ROOT, check=False, capture_output=True, text=True
-    )
+    done = subprocess.run([program, *arguments], env=around, cwd=ROOT, check=False, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout

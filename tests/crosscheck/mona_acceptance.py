@@ -31,9 +31,7 @@ def accepts(dot: str, word: list[int], names: list[str]) -> bool:
     state = 1
     for letter in word:
         values = {name: bool(letter >> bit & 1) for bit, name in enumerate(names)}
-        targets = [
-            target for shield_filter, target in edges.get(state, []) if eval(shield_filter, {}, values)
-        ]
+        targets = [target for shield_filter, target in edges.get(state, []) if eval(shield_filter, {}, values)]
         if len(targets) != 1:
             raise ValueError(f"{len(targets)} ways on from state {state}: {dot}")
         state = targets[0]

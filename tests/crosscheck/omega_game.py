@@ -104,9 +104,7 @@ class Game:
     def held_up(self, nodes: list[int]) -> str:
         """Say that nobody in the goal has a free exit, and that the ego is near an exit of one who is there."""
         stuck = all_of(f"(~ {self.taken([v])} \\/ ~ {self.exits_free(v)})" for v in nodes)
-        near = any_of(
-            f"({self.taken([v])} /\\ {self.ego_among([*self.request['beside'][v], *nodes])})" for v in nodes
-        )
+        near = any_of(f"({self.taken([v])} /\\ {self.ego_among([*self.request['beside'][v], *nodes])})" for v in nodes)
         return f"({stuck} /\\ {near})"
 
     def ego_among(self, cells: list[int]) -> str:
@@ -119,9 +117,7 @@ class Game:
                 f"((c{i} = {v}) /\\ {any_of(f'''(c{i}' = {lane})''' for lane in self.following[v])})"
                 for v in self.nodes
             )
-            enter = any_of(
-                f"({self.waits(f'c{i}', v)} /\\ {self.clear(v, i)} /\\ (c{i}' = {v}))" for v in self.nodes
-            )
+            enter = any_of(f"({self.waits(f'c{i}', v)} /\\ {self.clear(v, i)} /\\ (c{i}' = {v}))" for v in self.nodes)
             parts &= self.bdd(f"(c{i}' = c{i}) \\/ {leave} \\/ ({enter} /\\ {self.first(i)})")
             parts &= self.bdd(all_of([f"(c{i}' # c0)", *(f"(c{i}' # c{j}')" for j in self.cars[1:i])]))
         for i, j in self.pairs:
@@ -149,12 +145,9 @@ class Game:
 
     def ego(self) -> Any:
         leave = any_of(
-            f"((c0 = {v}) /\\ {any_of(f'''(c0' = {lane})''' for lane in self.following[v])})"
-            for v in self.nodes
+            f"((c0 = {v}) /\\ {any_of(f'''(c0' = {lane})''' for lane in self.following[v])})" for v in self.nodes
         )
-        enter = any_of(
-            f"({self.waits('c0', v)} /\\ {self.clear(v, 0, chr(39))} /\\ (c0' = {v}))" for v in self.nodes
-        )
+        enter = any_of(f"({self.waits('c0', v)} /\\ {self.clear(v, 0, chr(39))} /\\ (c0' = {v}))" for v in self.nodes)
         may = self.aut.true
         if self.pairs:
             for j in self.cars[1:]:
@@ -179,9 +172,7 @@ class Game:
             found &= self.bdd(f"{self.together(f'c{i}', f'c{j}')} \\/ ~ b_{i}_{j}")
         for i, j, k in combinations(self.cars, 3) if self.pairs else ():
             three = self.bdd(f"{self.together(f'c{i}', f'c{j}')} /\\ {self.together(f'c{j}', f'c{k}')}")
-            cycles = (
-                f"(b_{i}_{j} /\\ b_{j}_{k} /\\ ~ b_{i}_{k}) \\/ (~ b_{i}_{j} /\\ ~ b_{j}_{k} /\\ b_{i}_{k})"
-            )
+            cycles = f"(b_{i}_{j} /\\ b_{j}_{k} /\\ ~ b_{i}_{k}) \\/ (~ b_{i}_{j} /\\ ~ b_{j}_{k} /\\ b_{i}_{k})"
             found &= ~three | ~self.bdd(cycles)
         return found
 

@@ -70,9 +70,7 @@ def main() -> None:
         except RuntimeError:
             answers.append(None)
             continue
-        answers.append(
-            [0 if good < 0.5 else 3 if bad < 0.5 else 1 for good, bad in zip(can, can_fail, strict=True)]
-        )
+        answers.append([0 if good < 0.5 else 3 if bad < 0.5 else 1 for good, bad in zip(can, can_fail, strict=True)])
     sys.stdout.write("\n" + json.dumps(answers) + "\n")
 
 

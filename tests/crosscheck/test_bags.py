@@ -63,9 +63,7 @@ def score_2016(bag: Path, data: Path) -> float:
     for topic, time, message in messages(bag):
         if topic != "/gazebo/model_states":
             continue
-        points = {
-            name: (p.position.x, p.position.y) for name, p in zip(message.name, message.pose, strict=True)
-        }
+        points = {name: (p.position.x, p.position.y) for name, p in zip(message.name, message.pose, strict=True)}
         x, y = points["ego"]
         agents = sum(name.startswith("agent") for name in points)
         if any(math.dist((x, y), at) < 0.36 for name, at in points.items() if name.startswith("agent")):
@@ -103,9 +101,7 @@ def test_trial_data_pin_the_bounds_to_what_was_drawn(folder: Path) -> None:
 
 def test_md5_sums_in_a_bag_are_those_of_2016(folder: Path) -> None:
     with rosbag1.Reader(folder / "trial.bag") as reader:
-        sums = {
-            connection.msgtype.replace("/msg/", "/"): connection.digest for connection in reader.connections
-        }
+        sums = {connection.msgtype.replace("/msg/", "/"): connection.digest for connection in reader.connections}
     shared = sums.keys() & MD5.keys()
     assert len(shared) == 3
     assert {kind: sums[kind] for kind in shared} == {kind: MD5[kind] for kind in shared}
@@ -155,9 +151,7 @@ def elsewhere(folder: Path, path: Path, *trials: tuple[float, float, float]) -> 
     zero = types["geometry_msgs/msg/Vector3"](0.0, 0.0, 0.0)
     still = types["geometry_msgs/msg/Twist"](zero, zero)
     turned = types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 1.0)
-    problem = next(
-        m.problemjson for topic, _, m in messages(folder / "trial.bag") if topic.endswith("instance_JSON")
-    )
+    problem = next(m.problemjson for topic, _, m in messages(folder / "trial.bag") if topic.endswith("instance_JSON"))
     begin = 1_463_000_000
     with rosbag1.Writer(path) as writer:
         kind = "integrator_chains_msgs/msg/ProblemInstanceJSON"
@@ -175,9 +169,7 @@ def elsewhere(folder: Path, path: Path, *trials: tuple[float, float, float]) -> 
             for k in range(round(first * 100), round(last * 100) + 1):
                 point = types["geometry_msgs/msg/Point"](0.005 * k, 0.0, 0.0)
                 pose = types["geometry_msgs/msg/Pose"](point, turned)
-                away = types["geometry_msgs/msg/Pose"](
-                    types["geometry_msgs/msg/Point"](3.0, 3.0, 0.0), turned
-                )
+                away = types["geometry_msgs/msg/Pose"](types["geometry_msgs/msg/Point"](3.0, 3.0, 0.0), turned)
                 message = types[poses](["ground_plane", "ego", "agent0"], [away, pose, away], [still] * 3)
                 writer.write(states, begin * 10**9 + k * 10_000_000, store.serialize_ros1(message, poses))
             if not math.isnan(over):

@@ -31,14 +31,9 @@ def test_distances_of_boxes_are_those_of_shapely() -> None:
     half = draw.uniform(0.05, 0.8, (2, count, 2))
     half[1, ::3, 1] = 0.0
     half[0, ::7] = 0.0
-    boxes = [
-        [Box(*p, *h, 0.0) for p, h in zip(one, size, strict=True)]
-        for one, size in zip(pose, half, strict=True)
-    ]
+    boxes = [[Box(*p, *h, 0.0) for p, h in zip(one, size, strict=True)] for one, size in zip(pose, half, strict=True)]
     found = np.array([box_gap(one, other) for one, other in zip(*boxes, strict=True)])
-    expected = [
-        placed(*pose[0][k], *half[0][k]).distance(placed(*pose[1][k], *half[1][k])) for k in range(count)
-    ]
+    expected = [placed(*pose[0][k], *half[0][k]).distance(placed(*pose[1][k], *half[1][k])) for k in range(count)]
     assert 100 < np.count_nonzero(found == 0.0) < count - 100
     assert np.allclose(found, expected, rtol=0.0, atol=1e-12)
 
@@ -57,8 +52,7 @@ def test_the_smallest_clearance_is_that_of_shapely() -> None:
         gaps = []
         for f in range(40):
             ego, *others = (
-                placed(frames.x[f, n], frames.y[f, n], frames.c[f, n], frames.s[f, n], *half)
-                for n in range(3)
+                placed(frames.x[f, n], frames.y[f, n], frames.c[f, n], frames.s[f, n], *half) for n in range(3)
             )
             gaps += [ego.distance(other) - 2 * grown for other in others]
             gaps += [ego.distance(Point(-2.0, 1.0)) - grown - 0.3, ego.distance(outline) - grown]

@@ -41,9 +41,7 @@ def asked(tool: str, script: str, request: object) -> Any:
 
 def spin_output(text: str) -> str:
     """Return what SPIN makes of a formula: a never claim."""
-    ran = subprocess.run(
-        [program("spin"), "-f", text], capture_output=True, text=True, check=False, timeout=600
-    )
+    ran = subprocess.run([program("spin"), "-f", text], capture_output=True, text=True, check=False, timeout=600)
     assert ran.returncode == 0, f"{text}: {ran.stdout}{ran.stderr}"
     assert "syntax error" not in ran.stdout, f"{text}: {ran.stdout}"
     return ran.stdout
@@ -72,16 +70,12 @@ def test_spin_reads_what_is_printed_as_it_is_meant() -> None:
 
 def test_spin_reads_the_tasks_of_2016() -> None:
     task = parse("([]<> ego_t_2_0) && ([]<> ego_t_1_1) && ([]<> ego_t_0_2)")
-    assert never_claim(
-        spin(Specification((), (task,), (), tuple(f"ego_t_{p}" for p in ("2_0", "1_1", "0_2"))), 0.1)
-    )
+    assert never_claim(spin(Specification((), (task,), (), tuple(f"ego_t_{p}" for p in ("2_0", "1_1", "0_2"))), 0.1))
 
 
 def signals_formula(random: Random) -> Formula:
     while True:
-        formula = drawn(
-            random, random.randint(1, 4), NAMES, past=random.random() < 0.5, bounds=True, longest=6
-        )
+        formula = drawn(random, random.randint(1, 4), NAMES, past=random.random() < 0.5, bounds=True, longest=6)
         if not any(part.op in (Op.TRUE, Op.FALSE) for part in subformulas(formula)):
             return formula
 

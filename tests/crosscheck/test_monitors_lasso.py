@@ -34,9 +34,7 @@ def verdicts(found: Automaton, word: list[int]) -> list[int]:
         valuation = sum((letter >> NAMES.index(name) & 1) << bit for bit, name in enumerate(found.names))
         place = state, int(found.letter[valuation]), sum((left == 0) << c for c, left in enumerate(clocks))
         reset = int(found.reset[place])
-        clocks = [
-            int(found.clocks[c]) - 1 if reset >> c & 1 else max(0, left - 1) for c, left in enumerate(clocks)
-        ]
+        clocks = [int(found.clocks[c]) - 1 if reset >> c & 1 else max(0, left - 1) for c, left in enumerate(clocks)]
         state = int(found.target[place])
         out.append(int(found.verdict[state]))
     return out

@@ -72,9 +72,7 @@ def random_words(random: Random) -> list[list[int]]:
     return [[random.randrange(4) for _ in range(random.randint(1, 6))] for _ in range(WORDS)]
 
 
-def compared(
-    formula: Formula, judged: Formula, words: list[list[int]], answer: list[bool]
-) -> tuple[int, int]:
+def compared(formula: Formula, judged: Formula, words: list[list[int]], answer: list[bool]) -> tuple[int, int]:
     """Return how many verdicts on `judged` were presumed and definite; they are those of `formula` on finite words.
 
     A definite verdict tells of all continuations, so it is the same only if no next and no yesterday looks beyond
@@ -100,8 +98,7 @@ def test_what_is_presumed_is_what_mona_accepts() -> None:
         asked.append((until_and_release_only(formula), random_words(random)))
     answers = accepted([("ltlf", written(formula), words) for formula, words in asked])
     counts = [
-        compared(formula, formula, words, answer)
-        for (formula, words), answer in zip(asked, answers, strict=True)
+        compared(formula, formula, words, answer) for (formula, words), answer in zip(asked, answers, strict=True)
     ]
     assert sum(presumed for presumed, _ in counts) > 400
     assert sum(definite for _, definite in counts) > 400

@@ -131,9 +131,7 @@ def test_cars_of_sumo_drive_through_it(network: RoadNetwork, tmp_path: Path) -> 
         for way in car.iter("route")
     }
     done = ElementTree.parse(tmp_path / "done.xml").getroot().iter("tripinfo")
-    assert {trip.get("id"): float(trip.get("routeLength", "nan")) for trip in done} == pytest.approx(
-        wanted, abs=1e-3
-    )
+    assert {trip.get("id"): float(trip.get("routeLength", "nan")) for trip in done} == pytest.approx(wanted, abs=1e-3)
 
 
 def test_what_netconvert_makes_of_ours_is_read_again(tmp_path: Path) -> None:

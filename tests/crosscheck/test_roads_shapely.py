@@ -49,9 +49,7 @@ def _points(network: RoadNetwork, seed: int) -> np.ndarray:
     t = network.tangents[s]
     along = network.lengths[s] * random.uniform(-0.1, 1.1, len(s))
     across = random.uniform(-0.9, 0.9, len(s))
-    near = (
-        network.points[network.ends[s, 0]] + along[:, None] * t + across[:, None] * t[:, ::-1] * [-1.0, 1.0]
-    )
+    near = network.points[network.ends[s, 0]] + along[:, None] * t + across[:, None] * t[:, ::-1] * [-1.0, 1.0]
     ends = network.points[random.integers(len(network.points), size=20)]
     far = random.uniform(-1e4, 1e4, (20, 2))
     return np.concatenate([box, near, ends, far])
@@ -126,9 +124,7 @@ def test_lane_coordinates_agree_with_shapely() -> None:
             tips = lookup.lane_start(TABLE, net, lane), lookup.lane_end(TABLE, net, lane)
             assert tips == network.lane_ends(lane)
             tx, ty = lookup.lane_direction(TABLE, net, lane)
-            assert (tx * (x1 - x0) + ty * (y1 - y0)) / sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2) == pytest.approx(
-                1.0
-            )
+            assert (tx * (x1 - x0) + ty * (y1 - y0)) / sqrt((x1 - x0) ** 2 + (y1 - y0) ** 2) == pytest.approx(1.0)
 
 
 def test_tables_hold_what_kernels_need() -> None:
@@ -151,7 +147,5 @@ def test_generated_networks_are_planar_and_clear_by_shapely() -> None:
         gap = shapely.distance(lines[a], lines[b])
         assert (gap[~share] >= 1.0 + 0.177 + 0.6 - 1e-9).all()
         assert (shapely.length(lines) >= 2.854 - 1e-9).all()
-        spread = shapely.distance(
-            *(shapely.points(network.points)[k] for k in np.triu_indices(len(network.points), 1))
-        )
+        spread = shapely.distance(*(shapely.points(network.points)[k] for k in np.triu_indices(len(network.points), 1)))
         assert (spread >= 2.354 - 1e-9).all()

@@ -73,9 +73,7 @@ def test_foxglove_reads_odometry_transforms_and_time(folder: Path, topics: dict[
     assert ("ego/base_footprint", "ego/base_link") in fixed
 
 
-def test_markers_show_roads_goals_obstacles_cars_and_breaches(
-    folder: Path, topics: dict[str, list[Any]]
-) -> None:
+def test_markers_show_roads_goals_obstacles_cars_and_breaches(folder: Path, topics: dict[str, list[Any]]) -> None:
     record = dt.load_record(folder / "trial.mcap")
     problem, frames = record.instance.problem, record.frames
     (roads,) = topics[ROADS]
@@ -121,10 +119,7 @@ def test_what_is_recorded_of_a_session_becomes_a_record(folder: Path, tmp_path: 
     ):
         ours = ("/odom", "/velocity", "/probleminstance_JSON")
         kept = {one.id: one for one in reader.connections if one.topic.endswith(ours)}
-        made = {
-            k: writer.add_connection(one.topic, one.msgtype, typestore=ros2_typestore())
-            for k, one in kept.items()
-        }
+        made = {k: writer.add_connection(one.topic, one.msgtype, typestore=ros2_typestore()) for k, one in kept.items()}
         for connection, time, data in reader.messages(list(kept.values())):
             writer.write(made[connection.id], time, data)
     assert main(["convert", str(bag), "-o", str(tmp_path / "back.mcap")]) == 0

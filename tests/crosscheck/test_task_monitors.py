@@ -92,9 +92,7 @@ def town(rules: dict[str, float] | None = None, *, breaks: bool = False) -> Conf
     return load_config(document)
 
 
-def record(
-    folder: Path, configuration: Configuration, controller: str, number: int
-) -> tuple[Instance, Frames]:
+def record(folder: Path, configuration: Configuration, controller: str, number: int) -> tuple[Instance, Frames]:
     file = folder / f"{controller}{number}.mcap"
     run_trial(draw(configuration, 5, number), controller, record=file, overwrite=True)
     kept = read(str(file))
@@ -130,9 +128,7 @@ def test_what_is_forgiven(tmp_path: Path) -> None:
     found: list[dict[Key, int]] = []
     for exceptions in (1, 3):
         configuration = town({**HURRIED, "exceptions": exceptions, "exception_time": 15.0}, breaks=True)
-        found += [
-            compared(*record(tmp_path, configuration, "lanes", number), waits=True) for number in range(6)
-        ]
+        found += [compared(*record(tmp_path, configuration, "lanes", number), waits=True) for number in range(6)]
     assert "E1" in all_rules(found, own=False)
     assert "3.stop" not in all_rules(found, own=False)
 
@@ -142,9 +138,7 @@ def test_monitors_and_referee_agree_on_scripts_that_break_everything() -> None:
     for roads, seeds in ((KITE, range(20, 26)), (GRID, range(20, 24))):
         goals = [roads.intersections[0], roads.intersections[2]]
         instance = case(roads, 6, goals, **{**QUICK, "enter_time": 4.0, "goal_time": 4.0})
-        found += [
-            compared(instance, frames_of(wander(roads, 6, 1500, seed, odd=seed % 2 == 0))) for seed in seeds
-        ]
+        found += [compared(instance, frames_of(wander(roads, 6, 1500, seed, odd=seed % 2 == 0))) for seed in seeds]
     assert all_rules(found, own=False) >= set(RULES[2:]) - {"E2"}
     assert all_rules(found, own=True) >= set(RULES[1:7]) - {"3.order"}
 

@@ -103,9 +103,7 @@ class Buchi:
         if found is None and done is None:
             return []
         shield_filter, target = found.groups() if found else (done[1] if done else "", "accept_all")
-        return [
-            (shield_filter.replace("!", " not ").replace("&&", " and ").replace("||", " or ").strip(), target)
-        ]
+        return [(shield_filter.replace("!", " not ").replace("&&", " and ").replace("||", " or ").strip(), target)]
 
     def accepts(self, word: list[dict[str, bool]], loop: int) -> bool:
         """Say whether the word is accepted whose last `loop` letters go on for ever."""

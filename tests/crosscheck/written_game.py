@@ -29,9 +29,7 @@ def sections(text: str) -> list[list[str]]:
         }
         made = [found.get(name, []) for name in TLSF]
         again = [[re.fullmatch(r"G \(F (.*)\)", line)[1] for line in side] for side in made[6:]]
-        return [
-            *([line.replace("&&", "&").replace("||", "|") for line in part] for part in [*made[:6], *again])
-        ]
+        return [*([line.replace("&&", "&").replace("||", "|") for line in part] for part in [*made[:6], *again])]
     found = {}
     for line in filter(None, text.splitlines()):
         if line.startswith("["):

@@ -151,8 +151,7 @@ def configuration(
         "problem_domain": "dubins_traffic",
         "network": NETWORKS[network],
         "e-agents": [
-            {"type": kind, "name": f"agent{k}", "parameters": dict(given)}
-            for k, (kind, given) in enumerate(rows)
+            {"type": kind, "name": f"agent{k}", "parameters": dict(given)} for k, (kind, given) in enumerate(rows)
         ],
         "number_trials": 1,
         "duration": seconds,
@@ -163,9 +162,7 @@ def configuration(
     }
 
 
-def trial(
-    document: Mapping[str, Any], controller: str, seed: int, folder: Path, *, shown: bool = False
-) -> Parts:
+def trial(document: Mapping[str, Any], controller: str, seed: int, folder: Path, *, shown: bool = False) -> Parts:
     """Run a trial; give its record, its score from the trial and from the record, and what a replay shows."""
     instance = dt.draw(dt.load_config(document), seed, 0)
     path = folder / "trial.mcap"
@@ -297,9 +294,7 @@ def _variants() -> dict[str, Case]:
             found[f"variant/{variant}/{controller}"] = partial(trial, document, controller, 7)
         egos = ("lanes", "rules", "lanes+shield", f"{__name__}:Swerving")
         for controller in (*egos, f"{__name__}:Keeping") if variant != "disturbed" else egos:
-            found[f"batch/{variant}/{controller.rpartition(':')[2]}"] = partial(
-                batch, document, controller, 11
-            )
+            found[f"batch/{variant}/{controller.rpartition(':')[2]}"] = partial(batch, document, controller, 11)
     old = [name for name in found if "/obstacles/" in name]
     return found | {name: partial(_not_refused, found[name]) for name in old}
 

@@ -63,9 +63,7 @@ def decoded_record(record: dt.Record) -> bytes:
         plain([frames.first, frames.rate, record.controller]),
     ]
     parts += [getattr(frames, name).tobytes() for name in (*REALS, *WHOLE, "bits")]
-    parts.append(
-        plain([list(map(repr, frames.contacts)), list(map(repr, frames.events)), repr(record.ending)])
-    )
+    parts.append(plain([list(map(repr, frames.contacts)), list(map(repr, frames.events)), repr(record.ending)]))
     parts.append(plain([[len(block), len(block.contacts), len(block.events)] for block in record.blocks]))
     return b"\n".join(parts)
 

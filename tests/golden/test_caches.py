@@ -64,7 +64,6 @@ def test_every_cache_is_behind_a_look() -> None:
         f"{module.name}.{item.name}"
         for module in modules()
         for item in module.definitions()
-        if isinstance(item, ast.FunctionDef)
-        and any(ast.unparse(one) == "jit_look" for one in item.decorator_list)
+        if isinstance(item, ast.FunctionDef) and any(ast.unparse(one) == "jit_look" for one in item.decorator_list)
     }
     assert found == LOOKS

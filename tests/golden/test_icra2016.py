@@ -154,9 +154,7 @@ def test_the_road_has_no_rounded_ends() -> None:
     instance = make_instance(goals=[(0, 0)])
     corner = make_frames(instance, still((-0.5, -0.1), 60) + still((0.0, 0.0), 1))
     assert metric(instance, corner)[1] == 2.0, "within 0.6 m of the corner, beside no segment"
-    edge = make_frames(
-        instance, still((1.5, -0.6), 60) + still((1.5, np.nextafter(-0.6, -1.0)), 60) + still(ON, 1)
-    )
+    edge = make_frames(instance, still((1.5, -0.6), 60) + still((1.5, np.nextafter(-0.6, -1.0)), 60) + still(ON, 1))
     assert metric(instance, edge)[1] == 2.0, "0.6 m is on the road"
 
 

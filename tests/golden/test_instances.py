@@ -12,9 +12,7 @@ from dubins_traffic.problem.draw import draw
 HERE = Path(__file__).parent / "instances"
 
 
-@pytest.mark.parametrize(
-    ("name", "seed", "trial"), [("demo", 0, 0), ("demo", 7, 2), ("wanderers", 2**63, 41)]
-)
+@pytest.mark.parametrize(("name", "seed", "trial"), [("demo", 0, 0), ("demo", 7, 2), ("wanderers", 2**63, 41)])
 def test_a_drawn_instance_is_the_golden_one(name: str, seed: int, trial: int) -> None:
     golden = json.loads((HERE / f"{name}-{seed}-{trial}.json").read_text())
     instance = draw(load_config(name), seed, trial)

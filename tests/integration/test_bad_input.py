@@ -425,9 +425,7 @@ def run_here(capsys: pytest.CaptureFixture[str]) -> Callable[[list[str]], tuple[
 
 
 def run_outside(arguments: list[str]) -> tuple[int, str, str]:
-    ran = subprocess.run(
-        [COMMAND, *arguments], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL
-    )
+    ran = subprocess.run([COMMAND, *arguments], capture_output=True, text=True, check=False, stdin=subprocess.DEVNULL)
     return ran.returncode, ran.stdout, ran.stderr
 
 

@@ -41,13 +41,10 @@ def test_the_game_does_not_change_where_roads_bend() -> None:
     for network in (straight, bent):
         road_cells = RoadCells.of(network, (0, 3), 3)
         solution = solve(build(Board(road_cells, Assumption.parse(ALL), 1)))
-        found.append(
-            (road_cells.nodes, Strategy.of(solution).board.others, solution.game.positions, solution)
-        )
+        found.append((road_cells.nodes, Strategy.of(solution).board.others, solution.game.positions, solution))
     assert found[0][:3] == found[1][:3]
     assert all(
-        np.array_equal(one.lost, other.lost)
-        for one, other in zip(found[0][3].losses, found[1][3].losses, strict=True)
+        np.array_equal(one.lost, other.lost) for one, other in zip(found[0][3].losses, found[1][3].losses, strict=True)
     )
 
 

@@ -58,9 +58,7 @@ def test_a_path_runs_along_the_middle_of_the_right_lane(network: Any) -> None:
 
 @pytest.mark.parametrize("trial", range(3))
 @pytest.mark.parametrize("network", [RING, SNAKE], ids=["ring", "snake"])
-def test_a_lone_car_keeps_to_the_middle_of_its_lane_round_all_curves(
-    network: Any, trial: int, tmp_path: Path
-) -> None:
+def test_a_lone_car_keeps_to_the_middle_of_its_lane_round_all_curves(network: Any, trial: int, tmp_path: Path) -> None:
     record = tmp_path / "trial.mcap"
     score = run_trial(_instance(network, trial, duration=90), "lanes", record=record).score
     frames = load_record(record).frames

@@ -102,9 +102,7 @@ def test_without_the_extra_it_is_named(monkeypatch) -> None:
 
 def test_ctrl_c_ends_the_builder(tmp_path: Path) -> None:
     around = {**os.environ, "NUMBA_CACHE_DIR": str(tmp_path), "DUBINS_TRAFFIC_KERNELS": "auto"}
-    process = subprocess.Popen(
-        BUILD, env=around, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
-    )
+    process = subprocess.Popen(BUILD, env=around, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
     with process:
         try:
             while not list(tmp_path.rglob("*.kernel")):

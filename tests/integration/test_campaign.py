@@ -132,9 +132,7 @@ def test_bad_trials_are_rows(tmp_path: Path) -> None:
     faulty = ends["controllers.py:Faulty", 0]
     assert set(faulty) == {"duration", "controller_fault", "crashed"}
     reasons = {row["end"]: row["reason"] for row in rows}
-    assert reasons["controller_fault"].startswith(
-        "ValueError: one goal is not enough at tick 5 (controllers.py:"
-    )
+    assert reasons["controller_fault"].startswith("ValueError: one goal is not enough at tick 5 (controllers.py:")
     assert "process that ran it ended" in reasons["crashed"]
     assert "fit on the road network" in reasons["failed"]
     records = {path.name for path in (out / "records").glob("*.mcap")}
@@ -209,9 +207,7 @@ class Patient:
 
 def test_trials_of_a_slow_controller_are_kept_one_by_one(tmp_path: Path) -> None:
     """A chunk of them was lost at Ctrl-C: none of 48 was kept after a third of the time."""
-    document = campaign(
-        controllers=["slow.py:Patient"], trials=24, factors={"duration": [1.0, 2.0]}, chunk=24
-    )
+    document = campaign(controllers=["slow.py:Patient"], trials=24, factors={"duration": [1.0, 2.0]}, chunk=24)
     file = written(tmp_path, document)
     (tmp_path / "slow.py").write_text(PATIENT)
     out = tmp_path / "out"

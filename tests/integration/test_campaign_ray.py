@@ -53,9 +53,7 @@ def test_workers_nodes_and_the_head_are_killed(
         table = (plain / "out" / "results.parquet").read_bytes()
         ray = ("--ray", cluster.address)
         file = written(many, DOCUMENT)
-        with subprocess.Popen(
-            command(file, many / "out", *ray), stdout=subprocess.PIPE, text=True
-        ) as process:
+        with subprocess.Popen(command(file, many / "out", *ray), stdout=subprocess.PIPE, text=True) as process:
             wait_for(many, 10, process)
             os.kill(int((many / "log").read_text().split()[-1]), signal.SIGKILL)
             wait_for(many, 30, process)
@@ -98,9 +96,7 @@ def finished(out: Path) -> int:
 
 
 def test_a_cluster_of_its_own_ends_with_the_campaign(tmp_path: Path) -> None:
-    small = campaign(
-        controllers=["controllers.py:Faulty", "simple"], trials=5, factors={"duration": [1.0]}, seed=0
-    )
+    small = campaign(controllers=["controllers.py:Faulty", "simple"], trials=5, factors={"duration": [1.0]}, seed=0)
     one, two = tmp_path / "one", tmp_path / "two"
     one.mkdir()
     two.mkdir()

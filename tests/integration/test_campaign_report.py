@@ -75,9 +75,7 @@ def sheet(folder: Path, name: str) -> list[dict[str, str]]:
 def test_means_medians_and_differences_are_those_of_the_table(folder: Path) -> None:
     own = {name: [row for row in rows(folder) if row["controller"] == name] for name in CONTROLLERS}
     for line in sheet(folder, "controllers.csv"):
-        values = [
-            float(row[line["metric"]]) for row in own[line["controller"]] if row[line["metric"]] is not None
-        ]
+        values = [float(row[line["metric"]]) for row in own[line["controller"]] if row[line["metric"]] is not None]
         assert int(line["count"]) == len(values)
         assert float(line["mean"]) == pytest.approx(statistics.fmean(values))
         assert float(line["median"]) == pytest.approx(statistics.median(values))
@@ -130,9 +128,7 @@ def test_every_metric_of_a_score_is_compared(folder: Path) -> None:
         if own.column.kind != "string" and not any(name.startswith(part) for part in parts)
     }
     assert compared == numbers - {"excuse_sensed", "near"}
-    means = {
-        (line["controller"], line["metric"]): float(line["mean"]) for line in sheet(folder, "controllers.csv")
-    }
+    means = {(line["controller"], line["metric"]): float(line["mean"]) for line in sheet(folder, "controllers.csv")}
     assert means["lanes", "interventions"] == means["simple", "interventions"] == 0.0
     assert means["simple+shield", "interventions"] > 0.0
 
@@ -200,9 +196,7 @@ def test_letters_of_charts_are_as_large_as_those_of_the_page(
     assert len(charts) > 10
     for scale, svg in charts:
         assert scale == pytest.approx(1.0, abs=0.005)
-        letters = {
-            float(points) * 4 / 3 for points in re.findall(r"font(?:-size)?: (?:\w+ )?([\d.]+)px", svg)
-        }
+        letters = {float(points) * 4 / 3 for points in re.findall(r"font(?:-size)?: (?:\w+ )?([\d.]+)px", svg)}
         assert letters == {14.0}
 
 
@@ -278,9 +272,7 @@ def test_results_are_a_table_a_dict_and_a_picture(folder: Path) -> None:
     assert len(results) == 36
     assert repr(results) == f"<CampaignResults {folder}: 36 of 36 trials of {', '.join(CONTROLLERS)}>"
     columns = results.asdict()
-    assert [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)] == rows(
-        folder
-    )
+    assert [dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True)] == rows(folder)
     text = results._repr_html_()
     assert text.count("<svg") == 1
     assert all(name in text for name in CONTROLLERS)
@@ -298,9 +290,7 @@ def test_results_are_a_data_frame(folder: Path) -> None:
 def test_no_chart_shows_nothing_and_a_line_says_of_what(folder: Path) -> None:
     text = html.unescape((folder / "report" / "index.html").read_text())
     told = sheet(folder, "controllers.csv")
-    silent = {line["metric"] for line in told} - {
-        line["metric"] for line in told if float(line["mean"] or 0.0)
-    }
+    silent = {line["metric"] for line in told} - {line["metric"] for line in told if float(line["mean"] or 0.0)}
     assert "collisions_among_others" in silent
     (note,) = re.findall(r"No chart of what is 0 or absent everywhere: (.*?)\.</p>", text)
     named = {metric.label for metric in REPORTED if metric.name in silent}

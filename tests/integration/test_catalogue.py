@@ -35,9 +35,7 @@ def test_agents_with_parameters_defaults_and_who_cannot_keep_e1(capsys):
         for key, info in kind.model_fields.items():
             assert re.search(rf"^ +{key} ", block, re.MULTILINE), key
             assert info.description
-        assert ("can't keep E1" in block) == (
-            name in {"wander", "loop", "follow", "parked", "scripted", "nudged"}
-        )
+        assert ("can't keep E1" in block) == (name in {"wander", "loop", "follow", "parked", "scripted", "nudged"})
     assert re.search(r"^ +speed +0\.5 +speed between turns, m/s$", out, re.MULTILINE)
     assert re.search(r"^ +commands +required ", out, re.MULTILINE)
 

@@ -194,9 +194,7 @@ def test_ctrl_c_ends_it_with_a_line(faulty: str) -> None:
         assert process.stderr is not None
         assert process.stderr.readline() == "asked\n"
         os.killpg(process.pid, signal.SIGINT)
-        assert (
-            process.stderr.read() == "dubins-traffic: interrupted\n"
-        )  # the process of the course has ended, too
+        assert process.stderr.read() == "dubins-traffic: interrupted\n"  # the process of the course has ended, too
         assert process.wait() == 1
 
 

@@ -300,9 +300,7 @@ def test_a_fault_ends_its_own_trial_only(capsys):
 
 
 def test_a_late_controller_ends_its_trial(run):
-    sheet = json.loads(
-        run("run", CONFIG, "--controller", "mine.py:Late", "--deadline", "0.5", "--json", status=1)
-    )
+    sheet = json.loads(run("run", CONFIG, "--controller", "mine.py:Late", "--deadline", "0.5", "--json", status=1))
     assert sheet["trials"][0]["end"] == "deadline"
 
 

@@ -192,9 +192,7 @@ def test_other_seeds_of_a_test_phase_show_the_same(tmp_path: Path) -> None:
 
 
 @needs_boxes
-def test_a_season_on_the_command_line(
-    tmp_path: Path, command: Callable[..., subprocess.CompletedProcess[str]]
-) -> None:
+def test_a_season_on_the_command_line(tmp_path: Path, command: Callable[..., subprocess.CompletedProcess[str]]) -> None:
     shutil.copytree(ROOT / "examples" / "competition", tmp_path / "spring")
     file = tmp_path / "spring" / "competition.toml"
     dates = {"2027-02-15": "2026-01-01", "2027-03-01": "2026-02-01", "2027-01-01": "2025-12-01"}
@@ -212,9 +210,7 @@ def test_a_season_on_the_command_line(
     assert "2 trials of town; shows nothing; secret seeds" in ours("competition", "check", "spring")
     sealed = ours("competition", "seal", "spring", "--phase", "test", "--key-file", key)
     assert ours("competition", "open", "spring", "--phase", "test") == sealed
-    assert "outside" in ours(
-        "competition", "reveal", "spring", "--phase", "test", "--key-file", "spring/key", status=2
-    )
+    assert "outside" in ours("competition", "reveal", "spring", "--phase", "test", "--key-file", "spring/key", status=2)
     ours("template", "python", "entry")
     (tmp_path / "good.py").write_text(CONTROLLERS["rules"])
     late = ours("evaluate", "entry", "--competition", "spring", "--phase", "test", status=2)
@@ -242,9 +238,7 @@ def test_a_season_on_the_command_line(
     assert places["places"][0]["place"] == 1
     assert {own["entry"] for own in places["places"]} == {"ours", "second"}
     assert [(own["first"], own["second"]) for own in places["differences"]] == [("ours", "second")]
-    assert "counted_rounds of 2 trials" in ours(
-        "competition", "rank", "spring", "--phase", "test", "results/ours"
-    )
+    assert "counted_rounds of 2 trials" in ours("competition", "rank", "spring", "--phase", "test", "results/ours")
 
 
 @needs_boxes

@@ -83,9 +83,7 @@ def test_a_weaker_assumption_than_the_problem_s_may_be_played() -> None:
         (("counter",), "E7", "not an assumption"),
     ],
 )
-def test_teams_that_can_not_play_are_refused(
-    kinds: tuple[str, ...], assume: str | None, message: str
-) -> None:
+def test_teams_that_can_not_play_are_refused(kinds: tuple[str, ...], assume: str | None, message: str) -> None:
     own = instance(replace(FAIRNESS, cars=len(kinds)), 1, 5.0)
     agents = tuple(
         EAgent(kind, agent.name, kind, parameters_of(kind, {"assume": assume} if kind == "counter" else {}))

@@ -257,9 +257,7 @@ def test_the_second_ends_a_campaign_and_its_workers(tmp_path: Path) -> None:
 
 def wait_for(line: str, process: subprocess.Popen[str]) -> None:
     assert process.stderr is not None
-    assert line in iter(lambda: process.stderr.readline().strip() if process.stderr else "", ""), (
-        "it has ended"
-    )
+    assert line in iter(lambda: process.stderr.readline().strip() if process.stderr else "", ""), "it has ended"
 
 
 def test_when_all_is_done() -> None:

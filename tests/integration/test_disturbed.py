@@ -179,9 +179,7 @@ def test_a_fork_draws_other_noise() -> None:
     for one in (trial, same, other):
         for _ in range(90):
             one.advance((0.0, 0.0))
-    mine, its, others = (
-        np.array([own.pose for own in one.observation.others]) for one in (trial, same, other)
-    )
+    mine, its, others = (np.array([own.pose for own in one.observation.others]) for one in (trial, same, other))
     assert np.array_equal(mine, its)
     assert not np.array_equal(mine, others)
 

@@ -151,12 +151,8 @@ def test_no_width_of_a_terminal_hides_the_scores() -> None:
 
 
 def test_a_system_without_locks_is_refused_with_a_word() -> None:
-    code = (
-        "import sys; sys.modules['fcntl'] = None\nfrom dubins_traffic.cli.main import main\nsys.exit(main())"
-    )
-    done = subprocess.run(
-        [sys.executable, "-c", code, "list", "agents"], capture_output=True, text=True, check=False
-    )
+    code = "import sys; sys.modules['fcntl'] = None\nfrom dubins_traffic.cli.main import main\nsys.exit(main())"
+    done = subprocess.run([sys.executable, "-c", code, "list", "agents"], capture_output=True, text=True, check=False)
     said = "dubins-traffic: this system has no locks for files (fcntl): Linux or macOS is needed\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", said)
 

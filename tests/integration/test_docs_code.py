@@ -74,11 +74,7 @@ def named() -> list[str]:
     pages = {name: path for name, path in all_pages().items() if name != "extending/transport.md"}
     texts = [path.read_text(encoding="utf-8") for path in pages.values()]
     return sorted(
-        {
-            line
-            for text in texts
-            for line in re.findall(r"`(dubins-traffic [a-z][\w-]*(?: [a-z][\w-]*)?)", text)
-        }
+        {line for text in texts for line in re.findall(r"`(dubins-traffic [a-z][\w-]*(?: [a-z][\w-]*)?)", text)}
     )
 
 
@@ -120,25 +116,17 @@ def test_no_command_hides_where_no_test_looks_for_it() -> None:
 
 
 @pytest.mark.path
-def test_the_site_shows_nothing_of_what_pages_say_to_the_tests(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_site_shows_nothing_of_what_pages_say_to_the_tests(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(ROOT / "website")
     runpy.run_path(str(ROOT / "website" / "pages.py"))["gather"](tmp_path)
     texts = {path: path.read_text(encoding="utf-8") for path in tmp_path.rglob("*.md")}
     assert len(texts) > 50
-    assert [
-        path for path, text in texts.items() if re.search(r"^<!-- test: .* -->$", text, re.MULTILINE)
-    ] == []
+    assert [path for path, text in texts.items() if re.search(r"^<!-- test: .* -->$", text, re.MULTILINE)] == []
 
 
 @pytest.mark.parametrize(
     "block",
-    [
-        pytest.param(block, id=f"{name}:{block.line}")
-        for name, block in SHOWN
-        if block.language in {"toml", "xml"}
-    ],
+    [pytest.param(block, id=f"{name}:{block.line}") for name, block in SHOWN if block.language in {"toml", "xml"}],
 )
 @pytest.mark.path
 def test_a_document_of_a_page_can_be_read(block: Block) -> None:

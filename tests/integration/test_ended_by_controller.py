@@ -132,9 +132,7 @@ def test_a_submission(who: str, end: str, reason: str, capsys: pytest.CaptureFix
 
 
 @WHO
-def test_a_record_says_how_its_trial_ended(
-    who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_record_says_how_its_trial_ended(who: str, end: str, reason: str, capsys: pytest.CaptureFixture[str]) -> None:
     for name, out in ((f"own.py:{who}", "early"), ("lanes", "whole")):
         main(["run", "junction", "--controller", name, "--trials", "1", "--records", out])
     whole = Path("whole/trial-0000.mcap").read_bytes()
@@ -228,9 +226,7 @@ def test_no_estimate_rests_on_trials_that_their_controller_ended(capsys: pytest.
     assert main(arguments) == 1
     out, err = capsys.readouterr()
     assert out == "1.collision is broken: no estimate, since all 8 trials ended by a fault\n"
-    assert (
-        "8 of 8 trials ended by a fault (8 controller_fault); the first: trial 0: controller_fault: " in err
-    )
+    assert "8 of 8 trials ended by a fault (8 controller_fault); the first: trial 0: controller_fault: " in err
     assert "out of ideas" in err
     assert main([*arguments, "--json"]) == 1
     found = json.loads(capsys.readouterr().out)
@@ -298,10 +294,7 @@ def test_a_search_names_the_fault_keeps_it_and_tests_nothing_by_it(
         out, err = capsys.readouterr()
         assert "the ego broke a rule in 0, " in out
         assert f"{trials} ended by a fault; " in out
-        assert (
-            f"{trials} of {trials} trials ended by a fault ({trials} {end}); the first: trial 0: {end}: "
-            in err
-        )
+        assert f"{trials} of {trials} trials ended by a fault ({trials} {end}); the first: trial 0: {end}: " in err
         assert reason in err
     report = json.loads(Path("out/search.json").read_text())
     assert (report["faulty"], report["faults"], report["violated"]) == (64, {end: 64}, 0)

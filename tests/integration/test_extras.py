@@ -168,9 +168,7 @@ def test_each_command_works_or_names_the_extra(extra: str, made: Path, tmp_path:
     place = tmp_path / "place"
     shutil.copytree(made, place)
     asked = [
-        one
-        for one in ASKED
-        if one.here and (one.ends or not has.keys() >= set(one.needs)) and not (one.once and extra)
+        one for one in ASKED if one.here and (one.ends or not has.keys() >= set(one.needs)) and not (one.once and extra)
     ]
     (tmp_path / "asked.json").write_text(json.dumps([one.line for one in asked]))
     words = ["env", "DUBINS_TRAFFIC_TOKEN=none", python, "-c", RUN, tmp_path / "asked.json"]

@@ -22,9 +22,7 @@ def test_rules_passes_the_cases_of_its_mutants() -> None:
 
 
 def test_the_shield_passes_the_cases_of_lanes() -> None:
-    assert [
-        own.file.name for own in outcomes(cases_in(CASES / "lanes"), "lanes+shield") if not own.passed
-    ] == []
+    assert [own.file.name for own in outcomes(cases_in(CASES / "lanes"), "lanes+shield") if not own.passed] == []
 
 
 def test_rules_gets_past_who_stands_askew_beside_it() -> None:
@@ -37,9 +35,7 @@ def test_rules_gets_past_who_stands_askew_beside_it() -> None:
     Or who stood before an obstacle just out of a bend was excused by the ego that waited in the bend behind it; or it
     did not fall back behind who had moved up beside it, to a bend or into a dead end.
     """
-    assert [
-        own.file.name for own in outcomes(cases_in(CONTRACT / "blocked"), "rules") if not own.passed
-    ] == []
+    assert [own.file.name for own in outcomes(cases_in(CONTRACT / "blocked"), "rules") if not own.passed] == []
 
 
 def test_who_keeps_the_law_is_not_brought_to_a_breach_by_an_ego_that_stands() -> None:

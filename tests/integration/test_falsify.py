@@ -69,9 +69,7 @@ def test_as_many_trials_are_proposed_at_a_time_as_a_search_is_told(tmp_path: Pat
     )  # fmt: skip
     assert sorted(set(whole)) == [0, 24, 48, 72, 96]
     with pytest.raises(dt.InputError, match="another search"):
-        dt.falsify(
-            a_minute("junction"), "simple", tmp_path / "few", trials=120, seed=1, duration=8.0, resume=True
-        )
+        dt.falsify(a_minute("junction"), "simple", tmp_path / "few", trials=120, seed=1, duration=8.0, resume=True)
     with pytest.raises(dt.InputError, match=r"most.*at least 1"):
         dt.falsify(a_minute("junction"), "simple", tmp_path / "none", trials=96, most=0)
 
@@ -94,9 +92,7 @@ def test_the_same_seed_gives_the_same_bytes_whoever_runs_the_trials_and_however_
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        dt.falsify(
-            a_minute("junction"), "simple", stopped, trials=192, seed=1, duration=8.0, progress=interrupt
-        )
+        dt.falsify(a_minute("junction"), "simple", stopped, trials=192, seed=1, duration=8.0, progress=interrupt)
     assert list(files(stopped))
     dt.falsify(a_minute("junction"), "simple", stopped, trials=192, seed=1, duration=8.0, resume=True)
     assert _bytes(stopped) == _bytes(found)
@@ -116,9 +112,7 @@ def test_a_search_that_is_interrupted_while_it_judges_goes_on_as_if_it_had_not_b
     monkeypatch.setattr(search, "case_in", once)
     with pytest.raises(KeyboardInterrupt):
         dt.falsify(a_minute("junction"), "simple", tmp_path / "found", trials=192, seed=1, duration=8.0)
-    dt.falsify(
-        a_minute("junction"), "simple", tmp_path / "found", trials=192, seed=1, duration=8.0, resume=True
-    )
+    dt.falsify(a_minute("junction"), "simple", tmp_path / "found", trials=192, seed=1, duration=8.0, resume=True)
     assert _bytes(tmp_path / "found") == _bytes(found)
 
 
@@ -182,21 +176,15 @@ def test_commands_find_shrink_and_run_cases_again(tmp_path: Path, capsys: pytest
 
 
 def test_controllers_of_ones_own_are_searched_too(tmp_path: Path) -> None:
-    result = dt.falsify(
-        a_minute("junction"), Rolling, tmp_path / "own", trials=32, duration=8.0, rules=["1.road"]
-    )
+    result = dt.falsify(a_minute("junction"), Rolling, tmp_path / "own", trials=32, duration=8.0, rules=["1.road"])
     assert result.violated
     assert {case.story.rule for case in result.cases.values()} == {"1.road"}
 
 
 def test_a_formula_and_the_least_score_can_be_asked_for(tmp_path: Path) -> None:
-    asked = dt.falsify(
-        a_minute("junction"), "simple", tmp_path / "f", trials=8, duration=6.0, formula="[] !left_ego"
-    )
+    asked = dt.falsify(a_minute("junction"), "simple", tmp_path / "f", trials=8, duration=6.0, formula="[] !left_ego")
     assert [case.story.rule for case in asked.cases.values()][:1] == ["formula asked"]
-    least = dt.falsify(
-        a_minute("junction"), "simple", tmp_path / "s", trials=16, duration=6.0, least_score=True
-    )
+    least = dt.falsify(a_minute("junction"), "simple", tmp_path / "s", trials=16, duration=6.0, least_score=True)
     assert {case.story.rule for case in least.cases.values()} == {"score"}
 
 
@@ -224,9 +212,7 @@ def test_splitting_and_monte_carlo_agree_on_an_event_whose_probability_is_known(
     crossings, particles, runs = (6, 200, 20) if FULL else (4, 60, 16)
     known = 3.0**-crossings
     configuration = corridor(crossings)
-    found = by_splitting(
-        drawn(configuration, 5), standing(), "1.collision", NEAR, particles, runs, 1, lambda _: None
-    )
+    found = by_splitting(drawn(configuration, 5), standing(), "1.collision", NEAR, particles, runs, 1, lambda _: None)
     assert found.probability == pytest.approx(known, rel=0.3)
     assert found.interval[0] <= known <= found.interval[1]
     count = 60_000 if FULL else 1_500
@@ -262,8 +248,6 @@ def test_monte_carlo_counts_what_the_judge_says() -> None:
         draw_many(configuration, 1, range(32)), LocalRunner("simple", "simple"), "3.stop", 0.0, lambda _: None
     )
     scores = dt.run_batch(configuration, "simple", trials=32, seed=1).sheet.trials
-    broken = sum(
-        score.verdict is not None and score.verdict.formulas["3.stop"] == "false" for score in scores
-    )
+    broken = sum(score.verdict is not None and score.verdict.formulas["3.stop"] == "false" for score in scores)
     assert found.events == broken
     assert found.interval[0] <= found.probability <= found.interval[1]

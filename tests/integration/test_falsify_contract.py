@@ -23,9 +23,7 @@ RING = [[0, 0, 1, 0], [0, 0, 0, 1], [1, 0, 1, 1], [0, 1, 1, 1]]
 TRIALS = 128
 
 
-def roads(
-    segments: list[list[int]], agents: list[dict[str, Any]], seconds: float, **more: Any
-) -> Configuration:
+def roads(segments: list[list[int]], agents: list[dict[str, Any]], seconds: float, **more: Any) -> Configuration:
     """Return a configuration whose goals are the first and the last intersection."""
     shape = [1 + max(max(row[1::2]) for row in segments), 1 + max(max(row[::2]) for row in segments)]
     document: dict[str, Any] = {
@@ -79,9 +77,7 @@ def test_what_free_cars_like_to_do_is_searched_and_shrunk(tmp_path: Path) -> Non
     case = next(iter(found.cases.values()))
     assert all(agent.parameters["whims"] for agent in case.instance.e_agents)
     again = falsify(own, "rules", tmp_path / "b", rules=[BLOCKED], trials=32, seed=1, duration=None)
-    resumed = falsify(
-        own, "rules", tmp_path / "b", rules=[BLOCKED], trials=TRIALS, seed=1, duration=None, resume=True
-    )
+    resumed = falsify(own, "rules", tmp_path / "b", rules=[BLOCKED], trials=TRIALS, seed=1, duration=None, resume=True)
     assert again.trials == 32
     assert resumed.cases.keys() == found.cases.keys()
     assert resumed.violated == found.violated

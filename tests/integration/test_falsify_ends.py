@@ -55,9 +55,9 @@ def test_each_kind_of_end_is_kept_once_and_is_none_of_the_breaches(folder: Path,
     assert report["faulty"] > len(kept) > 0
     broken = {name for name in report["cases"] if not name.startswith(("controller_fault", "gave_up"))}
     assert report["violated"] >= len(broken) > 0
-    assert {
-        name: report["cases"][name] for name in report["cases"] if name.startswith("controller_fault")
-    } == {path.stem: read_case(path).story.sentence for path in kept}
+    assert {name: report["cases"][name] for name in report["cases"] if name.startswith("controller_fault")} == {
+        path.stem: read_case(path).story.sentence for path in kept
+    }
 
 
 def test_a_case_ends_so_in_its_last_tick_when_it_is_run_again(folder: Path, kept: list[Path]) -> None:
@@ -68,9 +68,7 @@ def test_a_case_ends_so_in_its_last_tick_when_it_is_run_again(folder: Path, kept
         assert ending is not None
         assert (ending.end, ending.ticks) == (End.CONTROLLER_FAULT, case.story.tick)
         assert case.instance.ticks == case.story.tick + 1
-        assert case.story.sentence == (
-            f"At {case.story.tick / 30:.2f} s the controller ended the trial: {ending}."
-        )
+        assert case.story.sentence == (f"At {case.story.tick / 30:.2f} s the controller ended the trial: {ending}.")
         assert "float division by zero" in case.story.sentence
 
 
@@ -89,14 +87,10 @@ def test_it_is_shrunk_as_a_breach_is(folder: Path, kept: list[Path]) -> None:
 def test_who_was_mended_passes_it(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     crashing = regress(folder / "found", f"{folder / 'mine.py'}:Crashing")
     of_ends = [own for own in crashing if own.case.story.rule == "controller_fault"]
-    assert [("controller_fault" in own.broken, own.passed) for own in of_ends] == [(True, False)] * len(
-        of_ends
-    )
+    assert [("controller_fault" in own.broken, own.passed) for own in of_ends] == [(True, False)] * len(of_ends)
     mended = regress(folder / "found", f"{folder / 'mine.py'}:Mended")
     assert [outcome.fault for outcome in mended] == [""] * len(mended)
     assert all("controller_fault" not in outcome.broken for outcome in mended)
     mended_name = f"{folder / 'mine.py'}:Mended"
-    assert (
-        main(["shrink", str(of_ends[0].file), "-o", str(folder / "x.json"), "--controller", mended_name]) == 2
-    )
+    assert main(["shrink", str(of_ends[0].file), "-o", str(folder / "x.json"), "--controller", mended_name]) == 2
     assert "the ego does not break the rule" in capsys.readouterr().err

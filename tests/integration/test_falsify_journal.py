@@ -62,9 +62,7 @@ def kept(folder: Path) -> int:
 @pytest.mark.parametrize(
     ("number", "damaged"), [(signal.SIGKILL, False), (signal.SIGKILL, True), (signal.SIGINT, False)]
 )
-def test_trials_of_a_slow_controller_are_kept_one_by_one(
-    tmp_path: Path, number: signal.Signals, damaged: bool
-) -> None:
+def test_trials_of_a_slow_controller_are_kept_one_by_one(tmp_path: Path, number: signal.Signals, damaged: bool) -> None:
     (tmp_path / "slow.py").write_text(PATIENT)
     out, begun = tmp_path / "out", tmp_path / "begun"
     with subprocess.Popen(
@@ -89,9 +87,7 @@ def test_trials_of_a_slow_controller_are_kept_one_by_one(
     again = len(begun.read_text()) - ran
     assert not journal.exists()
     ran += again
-    plain = subprocess.run(
-        searching(tmp_path, "-o", str(tmp_path / "plain")), capture_output=True, check=False
-    )
+    plain = subprocess.run(searching(tmp_path, "-o", str(tmp_path / "plain")), capture_output=True, check=False)
     assert done.returncode == plain.returncode == 1
     assert whole(out) == whole(tmp_path / "plain")
     report = json.loads((out / "search.json").read_text())

@@ -105,9 +105,7 @@ def test_what_is_wrong_with_a_proposal_is_named_and_what_was_found_is_kept(
     answer: str, told: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     text = HALTON.replace("self.halton, ", "self.size = space.size; self.halton, ")
-    spec = own(
-        tmp_path, f"import threading{text.replace('return self', f'return {answer} if history else self')}"
-    )
+    spec = own(tmp_path, f"import threading{text.replace('return self', f'return {answer} if history else self')}")
     monkeypatch.setattr(plugged, "WAIT", 0.3 if "Event" in answer else 60.0)
     with pytest.raises(dt.InputError, match=told) as raised:
         searched(spec, tmp_path / "found")
@@ -139,14 +137,10 @@ def test_a_class_that_is_not_there_or_is_no_strategy_is_refused(
 def test_where_nothing_can_be_chosen_a_strategy_is_refused(tmp_path: Path) -> None:
     alone = WORLD | {"e-agents": [], "ego": {"start": [1.5, -0.3, 0.0]}}
     with pytest.raises(dt.InputError, match="there is nothing to choose"):
-        dt.falsify(
-            Configuration.from_document(alone), "simple", tmp_path / "found", strategy=own(tmp_path, HALTON)
-        )
+        dt.falsify(Configuration.from_document(alone), "simple", tmp_path / "found", strategy=own(tmp_path, HALTON))
 
 
-def test_margins_tell_the_strategy_how_near_a_trial_came(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_margins_tell_the_strategy_how_near_a_trial_came(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     text = f"""{HALTON}
 def note(results):
@@ -165,9 +159,7 @@ def note(results):
 
 
 @pytest.mark.tools
-def test_dual_annealing_of_psy_taliro_finds_a_planted_fault(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_dual_annealing_of_psy_taliro_finds_a_planted_fault(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     environment = Path(tools.interpreter_with("psytaliro")).parents[1]
     packages = next(environment.glob("lib/python*/site-packages"))
     monkeypatch.setattr(sys, "path", [*sys.path, str(packages)])

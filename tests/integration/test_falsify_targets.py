@@ -64,15 +64,11 @@ def impatient(duration: float) -> Configuration:
     """Return the junction with goals that are to be visited every two free-flow rounds."""
     document = a_minute("junction").to_document()
     rules = {"gap_rounds": 1.0}
-    return Configuration.from_document(
-        {**document, "rules": rules, "goals": [[0, 1], [2, 1]], "duration": duration}
-    )
+    return Configuration.from_document({**document, "rules": rules, "goals": [[0, 1], [2, 1]], "duration": duration})
 
 
 def test_a_goal_that_is_not_visited_is_found_and_the_case_ends_where_it_was_overdue(tmp_path: Path) -> None:
-    found = dt.falsify(
-        impatient(60.0), "lanes", tmp_path / "found", rules=["1.goal"], trials=24, seed=1, duration=None
-    )
+    found = dt.falsify(impatient(60.0), "lanes", tmp_path / "found", rules=["1.goal"], trials=24, seed=1, duration=None)
     assert found.violated
     assert {case.story.rule for case in found.cases.values()} == {"1.goal"}
     for case in found.cases.values():
@@ -102,8 +98,7 @@ def test_what_no_trial_can_break_is_refused(tmp_path: Path, capsys: pytest.Captu
     arguments = ["falsify", "junction", "--trials", "4", "-o", str(tmp_path / "a")]
     assert main([*arguments, "--rule", "1.goal"]) == 2
     assert (
-        "--duration: no gap between visits can be over its limit in trials so short: got 15"
-        in capsys.readouterr().err
+        "--duration: no gap between visits can be over its limit in trials so short: got 15" in capsys.readouterr().err
     )
     assert main([*arguments, "--formula", "[]<> ego_t_1_1"]) == 2
     assert "--formula: no trial of any length can break it" in capsys.readouterr().err
@@ -126,9 +121,7 @@ def trials_until_found(folder: Path, seed: int, most: int) -> int:
             raise FoundError
 
     try:
-        falsify(
-            meeting(), Standing, folder, formula=SOON, trials=most, seed=seed, duration=None, progress=look
-        )
+        falsify(meeting(), Standing, folder, formula=SOON, trials=most, seed=seed, duration=None, progress=look)
     except FoundError:
         return counts[0]
     return most + 1
@@ -171,9 +164,7 @@ def test_a_formula_that_can_not_be_read_is_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("form", [(), ("--json",)])
-def test_an_empty_cell_is_a_warning(
-    form: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_an_empty_cell_is_a_warning(form: tuple[str, ...], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """In two seconds nobody turns left at the crossing: nothing is known of it, which is said in every form."""
     arguments = ["--controller", "lanes", "--rule", "3.clear", "--trials", "2", "--duration", "2"]
     assert main(["falsify", "junction", *arguments, "-o", str(tmp_path / "found"), *form]) == 0

@@ -71,9 +71,7 @@ def same_frames(one: Frames, other: Frames) -> bool:
     return all(np.array_equal(getattr(one, name), getattr(other, name)) for name in names)
 
 
-def test_one_machine_drives_the_same_frames_whatever_its_format(
-    strategies: dict[str, Path], tmp_path: Path
-) -> None:
+def test_one_machine_drives_the_same_frames_whatever_its_format(strategies: dict[str, Path], tmp_path: Path) -> None:
     (first, *others) = (drive(str(strategies[form]), tmp_path) for form in FORMS)
     assert len(first.frames) == 1801
     for other in others:
@@ -205,9 +203,7 @@ def swapped(text: str) -> str:
         (swapped(foreign.as_tulip()), "reads what the ego chooses"),
     ],
 )
-def test_a_machine_with_another_split_of_the_players_is_refused(
-    made: str, message: str, tmp_path: Path
-) -> None:
+def test_a_machine_with_another_split_of_the_players_is_refused(made: str, message: str, tmp_path: Path) -> None:
     path = tmp_path / ("swapped.py" if made.startswith("class") else "swapped")
     path.write_text(made)
     for spec in (str(path), f"{path}+fallback"):
@@ -280,9 +276,7 @@ def damaged() -> list[tuple[str, str | bytes, str]]:
     ]
 
 
-@pytest.mark.parametrize(
-    ("data", "message"), [case[1:] for case in damaged()], ids=[case[0] for case in damaged()]
-)
+@pytest.mark.parametrize(("data", "message"), [case[1:] for case in damaged()], ids=[case[0] for case in damaged()])
 @pytest.mark.path
 def test_damaged_files_are_refused(data: str | bytes, message: str, tmp_path: Path) -> None:
     path = tmp_path / "strategy"

@@ -82,9 +82,7 @@ def gone_within(seconds: float, parent: int) -> bool:
 
 def command(*arguments: str, **environment: str) -> subprocess.CompletedProcess[str]:
     around = {key: value for key, value in os.environ.items() if key != "DISPLAY"} | environment
-    return subprocess.run(
-        [*PROGRAM, *arguments], capture_output=True, text=True, timeout=600, check=False, env=around
-    )
+    return subprocess.run([*PROGRAM, *arguments], capture_output=True, text=True, timeout=600, check=False, env=around)
 
 
 def end_or_stop(process: int, sign: int) -> None:
@@ -347,9 +345,7 @@ def test_lasers_and_contacts_are_those_of_the_bodies(body: Disc | Rectangle) -> 
     around = Surroundings(state, pack_cars([one.problem.car]), pack_obstacles([one.problem.obstacles]))
     scan(0, 0, 0.0, 5.0, rays, expected, around)
     contacts = [
-        contact
-        for _ in range(120)
-        for contact in simulator.step(np.array([[[0.5, 0.0], [0.0, 0.0], [0.0, 0.0]]]))[0]
+        contact for _ in range(120) for contact in simulator.step(np.array([[[0.5, 0.0], [0.0, 0.0], [0.0, 0.0]]]))[0]
     ]
     simulator.close()
     assert np.minimum(expected, 5.0) == pytest.approx(seen, abs=0.003)  # a sharp corner is a wall thick
@@ -362,9 +358,7 @@ def test_lasers_and_contacts_are_those_of_the_bodies(body: Disc | Rectangle) -> 
 
 
 def test_roads_are_worlds_that_others_can_read(tmp_path: Path) -> None:
-    instance = dt.draw(
-        dt.load_config(WANDERERS | {"obstacles": [{"disc": {"x": -3, "y": 0, "radius": 1}}]}), 0, 0
-    )
+    instance = dt.draw(dt.load_config(WANDERERS | {"obstacles": [{"disc": {"x": -3, "y": 0, "radius": 1}}]}), 0, 0)
     network = tmp_path / "instance.json"
     network.write_text(json.dumps(instance_to_document(instance)))
     for version in ("1.6", "1.9"):
@@ -381,9 +375,7 @@ def test_roads_are_worlds_that_others_can_read(tmp_path: Path) -> None:
     new = subprocess.run(
         [sys.executable, "-c", ask, str(tmp_path / "1.9.sdf")], capture_output=True, text=True, check=False
     )
-    need(
-        "libsdformat12" if "cannot open shared object" in new.stderr else "", "scripts/gazebo.sh installs it"
-    )
+    need("libsdformat12" if "cannot open shared object" in new.stderr else "", "scripts/gazebo.sh installs it")
     assert new.stdout.strip() == "Valid."
     assert new.returncode == 0, new.stderr
 

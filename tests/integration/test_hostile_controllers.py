@@ -364,9 +364,7 @@ def test_messages_of_faults_hold_no_folder_and_no_address(place):
             raise OSError(f"{place}/x.txt is gone, says {object()}")
 
     detail = run_trial(instance(), Talks()).ending.detail
-    assert detail.startswith(
-        "OSError: x.txt is gone, says <object object> at tick 0 (test_hostile_controllers.py:"
-    )
+    assert detail.startswith("OSError: x.txt is gone, says <object object> at tick 0 (test_hostile_controllers.py:")
 
 
 def test_debug_shows_the_whole_traceback(capsys, monkeypatch):

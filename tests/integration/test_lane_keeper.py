@@ -47,13 +47,9 @@ def internal_names(files: Sequence[str]) -> set[str]:
     brought = {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
     brought |= {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
     own = {node.name for node in nodes if isinstance(node, ast.FunctionDef | ast.ClassDef)}
-    own |= {
-        node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)
-    }
+    own |= {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Store)}
     used = {node.attr for node in nodes if isinstance(node, ast.Attribute) and isinstance(node.ctx, ast.Load)}
-    inner = {
-        name for name in brought if name.partition(".")[0] == "dubins_traffic" and name != "dubins_traffic"
-    }
+    inner = {name for name in brought if name.partition(".")[0] == "dubins_traffic" and name != "dubins_traffic"}
     return inner | (used - own - public_names()) | {name for name in used if name.startswith("_")}
 
 
@@ -120,9 +116,7 @@ def test_the_line_under_the_table_names_a_command_that_shows_the_breach(tmp_path
         text=True,
         check=True,
     )
-    told = re.search(
-        r"^Cost most: (\S+), (\d+ times|once), .*trial 0 at (\S+) s\.$", ran.stdout, re.MULTILINE
-    )
+    told = re.search(r"^Cost most: (\S+), (\d+ times|once), .*trial 0 at (\S+) s\.$", ran.stdout, re.MULTILINE)
     assert told
     command = re.search(r"^To see it: dubins-traffic (.*)$", ran.stdout, re.MULTILINE)
     assert command

@@ -32,11 +32,7 @@ def test_the_page_names_all_that_stands_in_an_observation() -> None:
     table = page[page.index("| part | holds |") : page.index("Metres without a bound")]
     for name in Layout(1, 0).names:
         word = name.split(".")[-1]
-        assert (
-            f"`{word}`" in table
-            or word in ("speed", "yaw_rate", "left")
-            or name.startswith(("own.", "cars[0]."))
-        )
+        assert f"`{word}`" in table or word in ("speed", "yaw_rate", "left") or name.startswith(("own.", "cars[0]."))
 
 
 def driven(name: str, controller: str, trials: int) -> list[Score]:
@@ -47,9 +43,7 @@ def driven(name: str, controller: str, trials: int) -> list[Score]:
 
 def test_what_has_been_learned_drives_better_than_simple_and_nearly_as_well_as_lanes() -> None:
     who = (str(EXAMPLE / "district.npz"), "simple", "lanes")
-    learned, simple, lanes = (
-        sum(own.counted_rounds or 0 for own in driven("district", one, 16)) for one in who
-    )
+    learned, simple, lanes = (sum(own.counted_rounds or 0 for own in driven("district", one, 16)) for one in who)
     assert learned > simple
     assert learned >= 0.3 * lanes
 
@@ -86,10 +80,7 @@ def test_what_has_been_taught_makes_counted_rounds_and_under_the_shield_as_many_
     taught = str(EXAMPLE / "junction.npz")
     config = load_config("junction")
     rounds = {
-        who: sum(
-            outcome.score.counted_rounds or 0
-            for outcome in run_batch(config, who, trials=14, seed=1000).outcomes
-        )
+        who: sum(outcome.score.counted_rounds or 0 for outcome in run_batch(config, who, trials=14, seed=1000).outcomes)
         for who in ("lanes", "rules", taught, f"{taught}+shield")
     }
     assert rounds["lanes"] == 0
@@ -107,15 +98,11 @@ def test_teaching_lessens_the_cross_entropy(monkeypatch: pytest.MonkeyPatch) -> 
     assert learned.act(np.zeros(Layout(example.CARS).size)).tolist() in learned.choices.tolist()
 
 
-def policy(
-    *sizes: int, names: tuple[str, ...] = ("own.speed",), choices: Any = (), fill: float = 0.0
-) -> Policy:
+def policy(*sizes: int, names: tuple[str, ...] = ("own.speed",), choices: Any = (), fill: float = 0.0) -> Policy:
     """Return a policy whose layers have so many rows, with all weights alike."""
     rows = sizes or (3, 2)
     widths = (len(names), *rows)
-    layers = tuple(
-        (np.full((after, before), fill), np.arange(after, 0.0, -1.0)) for before, after in pairwise(widths)
-    )
+    layers = tuple((np.full((after, before), fill), np.arange(after, 0.0, -1.0)) for before, after in pairwise(widths))
     return Policy(names, 1, 2, layers, np.array(choices, dtype=np.float64).reshape(-1, 2))
 
 

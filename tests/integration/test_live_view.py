@@ -27,9 +27,7 @@ def test_a_page_shows_each_picture_as_it_comes(tmp_path: Path) -> None:
             for number, grey in enumerate((40, 200, 90), start=1):
                 view.show(np.full((50, 60, 3), grey, dtype=np.uint8))
                 WebDriverWait(driver, 600).until(
-                    lambda _, number=number: (
-                        driver.execute_script("return document.body.dataset.shown") == str(number)
-                    )
+                    lambda _, number=number: driver.execute_script("return document.body.dataset.shown") == str(number)
                 )
                 assert driver.execute_script(COLOUR) == [grey, grey, grey, 255]
             assert driver.get_log("browser") == []

@@ -153,9 +153,7 @@ def test_no_default_name_replaces_anything_either() -> None:
 def test_a_mistyped_folder_holds_nothing_to_go_on_with(
     words: list[str], place: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    (place / "c.toml").write_text(
-        'version = 0\ntrials = 1\ncontrollers = ["simple"]\nconfigurations = ["demo"]\n'
-    )
+    (place / "c.toml").write_text('version = 0\ntrials = 1\ncontrollers = ["simple"]\nconfigurations = ["demo"]\n')
     assert main([*words, "-o", "mistyped", "--resume"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
     assert "mistyped: nothing to go on with; expected a folder that holds" in line

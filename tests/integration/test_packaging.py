@@ -70,6 +70,4 @@ def test_hosted_ci_runs_what_ci_runs_here() -> None:
 
 def _recipe(target: str) -> str:
     """Return the lines of a target of the Makefile."""
-    return f"\n{(ROOT / 'Makefile').read_text(encoding='utf-8')}".partition(f"\n{target}:")[2].partition(
-        "\n\n"
-    )[0]
+    return f"\n{(ROOT / 'Makefile').read_text(encoding='utf-8')}".partition(f"\n{target}:")[2].partition("\n\n")[0]

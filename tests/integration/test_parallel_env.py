@@ -66,9 +66,7 @@ def driven(env: Any, seed: int, steps: int = 10**6, bias: float = 0.5) -> list[A
     found: list[Any] = [env.reset(seed=seed)]
     cars = 1 + len(env.unwrapped.trial.e_agents)
     while env.agents and len(found) <= steps:
-        actions = {
-            name: np.clip(np.add(chance.uniform(-1.0, 1.0, 2), (bias, 0.0)), -1.0, 1.0) for name in env.agents
-        }
+        actions = {name: np.clip(np.add(chance.uniform(-1.0, 1.0, 2), (bias, 0.0)), -1.0, 1.0) for name in env.agents}
         bank, row = env.unwrapped.fleet.seat(0)
         state = bank.group.state
         found.append((*env.step(actions), [array[row, :cars].copy() for array in state[:6]]))
@@ -127,9 +125,7 @@ def test_run_trial_makes_the_frames_of_an_episode_again(more: dict[str, Any], sh
         again = kept.column(name)[skip::skip]
         mine = np.array([step[-1][k] for step in found[1:]])
         assert (again == mine).all(), name
-    breaches = (
-        [(one.rule, one.tick) for one in result.score.verdict.violations] if result.score.verdict else []
-    )
+    breaches = [(one.rule, one.tick) for one in result.score.verdict.violations] if result.score.verdict else []
     bank, row = inner.fleet.seat(0)
     assert {(one.rule, one.tick) for one in bank.group.breaches[row]} <= set(breaches)
     assert breaches or shielded
@@ -148,9 +144,7 @@ def test_a_shield_leaves_nothing_to_charge_and_says_when_it_steps_in() -> None:
 
 
 def test_a_shield_on_one_side_leaves_the_other_alone() -> None:
-    env: Any = Shielded(
-        parallel_env(config(cars=4, seconds=25.0), learned=None), others(parallel_env(config(cars=4)))
-    )
+    env: Any = Shielded(parallel_env(config(cars=4, seconds=25.0), learned=None), others(parallel_env(config(cars=4))))
     steps = driven(env, 1)[1:]
     assert all(("interventions" in info) == (name != "ego_0") for name, info in steps[0][4].items())
     assert sum(sum(step[4]["ego_0"]["costs"].values()) for step in steps) > 0
@@ -191,9 +185,7 @@ def test_e_agents_are_charged_until_the_ego_has_broken_its_part_and_the_ego_is_e
             for name, info in infos.items():
                 assert rewards[name] == pytest.approx(sum(info["reward_terms"].values()))
                 if name != "ego_0":
-                    task = sum(
-                        infos["ego_0"]["reward_terms"][term] for term in ("visits", "rounds", "progress")
-                    )
+                    task = sum(infos["ego_0"]["reward_terms"][term] for term in ("visits", "rounds", "progress"))
                     assert info["reward_terms"]["spoiled"] == pytest.approx(-task)
     assert seen
 
@@ -241,19 +233,14 @@ def test_what_one_side_breaks_soon_after_the_other_is_forgiven() -> None:
 def test_agents_are_told_where_the_ego_is_and_goes() -> None:
     env = parallel_env(config())
     observations, _ = env.reset(seed=3)
-    told = {
-        name: dict(zip(NAMES, seen[-len(NAMES) :].tolist(), strict=True))
-        for name, seen in observations.items()
-    }
+    told = {name: dict(zip(NAMES, seen[-len(NAMES) :].tolist(), strict=True)) for name, seen in observations.items()}
     assert [own["is_ego"] for own in told.values()] == [1.0, 0.0, 0.0, 0.0]
     ego, other = env.trial.starts[0], env.trial.starts[2]
     dx, dy = ego.x - other.x, ego.y - other.y
     away = np.hypot(dx, dy)
     assert told["car_2"]["bearing_cos"] == pytest.approx((other.c * dx + other.s * dy) / away, abs=1e-5)
     assert told["car_2"]["bearing_sin"] == pytest.approx((other.c * dy - other.s * dx) / away, abs=1e-5)
-    assert told["car_2"]["distance"] == pytest.approx(
-        away / (away + env.trial.problem.sensing_radius), abs=1e-5
-    )
+    assert told["car_2"]["distance"] == pytest.approx(away / (away + env.trial.problem.sensing_radius), abs=1e-5)
     assert len({own["route"] for own in told.values()}) == 1
     assert told["ego_0"]["distance"] == 0.0
 
@@ -284,9 +271,7 @@ def test_an_egos_controller_is_disturbed_as_in_any_trial(ego: str) -> None:
 
 
 def test_what_makes_no_sense_is_named() -> None:
-    with pytest.raises(
-        InputError, match=r"roles: no such role: got 'friends'; expected adversaries or peers"
-    ):
+    with pytest.raises(InputError, match=r"roles: no such role: got 'friends'; expected adversaries or peers"):
         parallel_env(config(), roles="friends")
     with pytest.raises(InputError, match=r"reward.others: no such term.*'visits'.*spoiled"):
         parallel_env(config(), reward={"others": {"visits": 1.0}})
@@ -343,9 +328,7 @@ def test_the_page_on_agents_runs(tmp_path: Path) -> None:
 
 
 def test_the_example_of_adversaries_drives_alike_again_and_breaks_nothing_of_e1_and_e2() -> None:
-    spec = importlib.util.spec_from_file_location(
-        "adversaries", ROOT / "examples" / "learning" / "adversaries.py"
-    )
+    spec = importlib.util.spec_from_file_location("adversaries", ROOT / "examples" / "learning" / "adversaries.py")
     assert spec is not None
     assert spec.loader is not None
     example: Any = importlib.util.module_from_spec(spec)

@@ -24,9 +24,7 @@ from tests.integration.test_parallel_env import config
 def actions(env: TrafficParallelVectorEnv, steps: int) -> Floats:
     """Return actions of all steps, of environment i the same whatever the number of environments, rather forward."""
     shape = steps, len(env.agents), 2
-    each = [
-        np.random.default_rng(i).uniform(-1.0, 1.0, shape) + np.array([0.5, 0.0]) for i in range(env.num_envs)
-    ]
+    each = [np.random.default_rng(i).uniform(-1.0, 1.0, shape) + np.array([0.5, 0.0]) for i in range(env.num_envs)]
     return np.clip(np.stack(each, axis=1), -1.0, 1.0)
 
 

@@ -123,9 +123,7 @@ def test_a_reader_that_has_had_enough_is_no_error(command):
     run_trial(draw(load_config(CONFIG), 0, 0), "simple", record="x.mcap")
     for reader in ("true", "head -1"):
         script = f"set -o pipefail; {COMMAND} {command} | {reader}"
-        done = subprocess.run(
-            ["bash", "-c", script], check=False, capture_output=True, text=True, timeout=600
-        )
+        done = subprocess.run(["bash", "-c", script], check=False, capture_output=True, text=True, timeout=600)
         assert done.returncode == 0, done.stderr
         assert done.stderr == ""
 
@@ -207,9 +205,7 @@ def test_what_is_shown_is_one_line():
     assert "too long to print" in str(InputError("p", value=10**5000))
 
 
-@pytest.mark.parametrize(
-    "command", ["run", "batch", "instance", "plot", "score", "replay", "campaign run -o out"]
-)
+@pytest.mark.parametrize("command", ["run", "batch", "instance", "plot", "score", "replay", "campaign run -o out"])
 def test_a_file_that_never_ends_is_refused(command, capsys):
     name, *rest = command.split(" ", 1)
     more = rest[0].split() if rest else []

@@ -222,9 +222,7 @@ def test_the_driver_in_cpp_goes_round_the_goals(version: str, nodes: Path) -> No
     subprocess.run(build, cwd=nodes, check=True)
     instance = dt.draw(dt.load_config("town"), 1, 0)
     goals = [tuple(instance.problem.network.points[v]) for v in instance.problem.goal_vertices]
-    with subprocess.Popen(
-        [nodes / "drive"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
-    ) as driver:
+    with subprocess.Popen([nodes / "drive"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as driver:
         assert driver.stdin is not None
         assert driver.stdout is not None
         driver.stdin.write(json.dumps(instance_to_document(instance, version=0)) + "\n")
@@ -252,9 +250,7 @@ def test_the_driver_in_cpp_goes_round_the_goals(version: str, nodes: Path) -> No
 def test_the_package_is_one_that_colcon_knows(nodes: Path) -> None:
     """Debian's catkin_pkg reads it; the launch file is Python."""
     asked = "import sys; from catkin_pkg.package import parse_package; print(parse_package(sys.argv[1]).name)"
-    told = subprocess.run(
-        ["/usr/bin/python3", "-c", asked, nodes], capture_output=True, text=True, check=True
-    ).stdout
+    told = subprocess.run(["/usr/bin/python3", "-c", asked, nodes], capture_output=True, text=True, check=True).stdout
     assert told == "traffic_nodes\n"
     compile((nodes / "trials.launch.py").read_text(), "trials.launch.py", "exec")
     installed = (nodes / "CMakeLists.txt").read_text()

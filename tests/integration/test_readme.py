@@ -32,9 +32,7 @@ def blocks(language: str) -> list[str]:
 
 
 def runnable(page: str) -> list[tuple[str, str]]:
-    return [
-        (language, text) for language, text in BLOCK.findall(page) if language in {"sh", "python", "toml"}
-    ]
+    return [(language, text) for language, text in BLOCK.findall(page) if language in {"sh", "python", "toml"}]
 
 
 def run_block(language: str, text: str, folder: Path) -> str:

@@ -59,9 +59,7 @@ def test_bends_are_paved_and_their_strokes_are_even(tmp_path: Path) -> None:
     network = read(record).instance.problem.network
     with browsing(tmp_path / "profile") as browser:
         browser.get((tmp_path / "replay.html").as_uri())
-        WebDriverWait(browser, 600).until(
-            lambda driver: driver.execute_script("return window.replay?.ready === true")
-        )
+        WebDriverWait(browser, 600).until(lambda driver: driver.execute_script("return window.replay?.ready === true"))
         press(browser, "l", "n", "t")
         bent = np.flatnonzero(network.bent).tolist()
         places = np.array([[inner(network, s, side) for side in (0.0, -0.5, 0.5)] for s in bent])

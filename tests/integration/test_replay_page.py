@@ -42,15 +42,11 @@ def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[webdriver.Chro
 @pytest.fixture(scope="module")
 def trial() -> tuple[Instance, Frames]:
     grid = RoadNetwork.grid(3, 4)
-    return driven(
-        instance(grid, 6, 30.0, names=(NASTY, "b", "c", "d", "e"), obstacles=obstacles_beside(grid))
-    )
+    return driven(instance(grid, 6, 30.0, names=(NASTY, "b", "c", "d", "e"), obstacles=obstacles_beside(grid)))
 
 
 @pytest.fixture
-def page(
-    browser: webdriver.Chrome, trial: tuple[Instance, Frames], tmp_path: Path
-) -> Iterator[webdriver.Chrome]:
+def page(browser: webdriver.Chrome, trial: tuple[Instance, Frames], tmp_path: Path) -> Iterator[webdriver.Chrome]:
     """The page of `trial`, open; whatever a test does there must leave the browser's log empty."""
     tried, frames = trial
     path = tmp_path / "replay.html"
@@ -58,9 +54,7 @@ def page(
     write_replay(path, tried, frames, Ending(End.DURATION, len(frames) - 1), {"rounds": 2}, marks)
     browser.set_window_size(1280, 800)
     browser.get(path.as_uri())
-    WebDriverWait(browser, 600).until(
-        lambda driver: driver.execute_script("return window.replay?.ready === true")
-    )
+    WebDriverWait(browser, 600).until(lambda driver: driver.execute_script("return window.replay?.ready === true"))
     yield browser
     assert browser.get_log("browser") == []
 
@@ -72,17 +66,13 @@ BREACHES = [
 
 
 @pytest.fixture
-def judged(
-    browser: webdriver.Chrome, trial: tuple[Instance, Frames], tmp_path: Path
-) -> Iterator[webdriver.Chrome]:
+def judged(browser: webdriver.Chrome, trial: tuple[Instance, Frames], tmp_path: Path) -> Iterator[webdriver.Chrome]:
     """The page of `trial` with breaches, of which the first excuses the ego."""
     tried, frames = trial
     write_replay(tmp_path / "judged.html", tried, frames, None, verdict=verdict(tried, BREACHES, 0))
     browser.set_window_size(1280, 800)
     browser.get((tmp_path / "judged.html").as_uri())
-    WebDriverWait(browser, 600).until(
-        lambda driver: driver.execute_script("return window.replay?.ready === true")
-    )
+    WebDriverWait(browser, 600).until(lambda driver: driver.execute_script("return window.replay?.ready === true"))
     yield browser
     assert browser.get_log("browser") == []
 
@@ -93,9 +83,7 @@ def test_a_page_begins_at_the_second_that_it_is_told(
     tried, frames = trial
     write_replay(tmp_path / "late.html", tried, frames, None, at=12.5)
     browser.get((tmp_path / "late.html").as_uri())
-    WebDriverWait(browser, 600).until(
-        lambda driver: driver.execute_script("return window.replay?.ready === true")
-    )
+    WebDriverWait(browser, 600).until(lambda driver: driver.execute_script("return window.replay?.ready === true"))
     assert (ask(browser, "time"), ask(browser, "playing")) == (12.5, False)
     assert browser.get_log("browser") == []
 
@@ -111,9 +99,7 @@ def test_an_exported_notebook_plays_a_record(
     exported.write_text(text, encoding="utf-8")
     browser.get(exported.as_uri())
     browser.switch_to.frame(browser.find_element(By.TAG_NAME, "iframe"))
-    WebDriverWait(browser, 600).until(
-        lambda driver: driver.execute_script("return window.replay?.ready === true")
-    )
+    WebDriverWait(browser, 600).until(lambda driver: driver.execute_script("return window.replay?.ready === true"))
     before, begun = browser.execute_script(PICTURE), ask(browser, "time")
     element(browser, "play").click()
     WebDriverWait(browser, 600).until(lambda driver: ask(driver, "time") > begun + 0.5)
@@ -146,9 +132,7 @@ def test_a_long_reason_of_an_end_is_shown_in_full_and_makes_the_page_no_wider(
     try:
         widen(browser, width)
         browser.get((tmp_path / "long.html").as_uri())
-        WebDriverWait(browser, 600).until(
-            lambda driver: driver.execute_script("return window.replay?.ready === true")
-        )
+        WebDriverWait(browser, 600).until(lambda driver: driver.execute_script("return window.replay?.ready === true"))
         assert why in element(browser, "ending").text
         assert sideways(browser) <= 0
         whole = "const e = document.getElementById('ending'); return e.scrollWidth <= e.clientWidth"
@@ -197,9 +181,7 @@ def test_plays_pauses_and_stops_at_the_end(page: webdriver.Chrome) -> None:
     assert ask(page, "frame") == 900
 
 
-def test_scrubbing_draws_the_frame_of_that_time(
-    page: webdriver.Chrome, trial: tuple[Instance, Frames]
-) -> None:
+def test_scrubbing_draws_the_frame_of_that_time(page: webdriver.Chrome, trial: tuple[Instance, Frames]) -> None:
     _, frames = trial
     before = page.execute_script(PICTURE)
     slider = element(page, "slider")
@@ -214,8 +196,7 @@ def test_scrubbing_draws_the_frame_of_that_time(
         assert pose["x"] + origin[0] == pytest.approx(frames.x[frame, car], abs=0.02)
         assert pose["y"] + origin[1] == pytest.approx(frames.y[frame, car], abs=0.02)
     page.execute_script(
-        "const s = document.getElementById('slider'); s.value = 10;"
-        "s.dispatchEvent(new Event('input', {bubbles: true}))"
+        "const s = document.getElementById('slider'); s.value = 10;s.dispatchEvent(new Event('input', {bubbles: true}))"
     )
     assert ask(page, "time") == pytest.approx(10.0)
     assert slider.get_attribute("aria-valuetext") == "10.00 s of 30.00 s"

@@ -41,8 +41,7 @@ def test_mean_returns_order_drivers_as_the_ranking_does(name: str) -> None:
     rows: list[tuple[float, float, float]] = []
     for driver in ("stands", "simple", "lanes", "rules"):
         found = [
-            paid(env, AsEgo(Stands()) if driver == "stands" else load(driver), 1000 + trial)
-            for trial in range(TRIALS)
+            paid(env, AsEgo(Stands()) if driver == "stands" else load(driver), 1000 + trial) for trial in range(TRIALS)
         ]
         scores = [score for _, score, _ in found]
         rows.append(
@@ -61,9 +60,7 @@ def test_mean_returns_order_drivers_as_the_ranking_does(name: str) -> None:
 
 @pytest.mark.parametrize("name", ["lanes", "rules"])
 def test_the_reward_score_sums_to_the_rounds_before_the_first_breach(name: str) -> None:
-    env = gymnasium.make(
-        "dubins_traffic/Junction-v0", observation="object", reward=SCORE, disable_env_checker=True
-    )
+    env = gymnasium.make("dubins_traffic/Junction-v0", observation="object", reward=SCORE, disable_env_checker=True)
     found = [paid(env, load(name), trial)[:2] for trial in range(2)]
     assert [total for total, _ in found] == pytest.approx([score.rounds_before_breach for _, score in found])
     assert max(total for total, _ in found) > 0.0
@@ -84,9 +81,7 @@ def test_who_stays_off_the_road_earns_ever_less() -> None:
     config = {**SHORT, "duration": 20.0, "e-agents": []}
     reward = dict.fromkeys(TERMS, 1.0)
     _, _, terms = paid(single(config, observation="object", reward=reward), LeavesTheRoad(), 3)
-    _, score, free = paid(
-        single(config, observation="object", reward={**reward, "debt": 0.0}), LeavesTheRoad(), 3
-    )
+    _, score, free = paid(single(config, observation="object", reward={**reward, "debt": 0.0}), LeavesTheRoad(), 3)
     debt, shares = 0.0, []
     for owing, own in zip(terms, free, strict=True):
         if own["progress"]:

@@ -54,9 +54,7 @@ def nodes(tmp_path_factory: pytest.TempPathFactory) -> Path:
         "--cpp",
     ]
     subprocess.run(messages, check=True, capture_output=True)
-    flags = subprocess.run(
-        ["pkg-config", "--cflags", "--libs", "roscpp"], check=True, capture_output=True, text=True
-    )
+    flags = subprocess.run(["pkg-config", "--cflags", "--libs", "roscpp"], check=True, capture_output=True, text=True)
     builds = []
     for source in ("examples/ros1/controller.cpp", "examples/ros1/wander.cpp", "tests/ros_client.cpp"):
         command = [
@@ -97,9 +95,7 @@ def test_a_python_client_goes_through_trials_resets_and_restarts(ros: Graph, tmp
     assert len(data["instances"]) == 4
 
 
-def test_a_client_in_cpp_goes_through_trials_resets_and_restarts(
-    ros: Graph, tmp_path: Path, nodes: Path
-) -> None:
+def test_a_client_in_cpp_goes_through_trials_resets_and_restarts(ros: Graph, tmp_path: Path, nodes: Path) -> None:
     session = begun(ros, tmp_path)
     client = ros.start([nodes / "ros_client", "drive", "reset", "restart", "drive"])
     seen = through(session, client, tmp_path)
@@ -114,9 +110,7 @@ def begun(ros: Graph, folder: Path) -> subprocess.Popen[str]:
     return ros.session(config, "--records", folder / "out", "-f", folder / "data.json")
 
 
-def through(
-    session: subprocess.Popen[str], client: subprocess.Popen[str], folder: Path
-) -> list[dict[str, Any]]:
+def through(session: subprocess.Popen[str], client: subprocess.Popen[str], folder: Path) -> list[dict[str, Any]]:
     """Return what a client has seen that drove, asked RESET, asked RESTART and drove."""
     status, out, err = finish(client)
     assert status == 0, err
@@ -347,13 +341,9 @@ def test_a_launch_file_starts_a_session_with_its_controller(tmp_path: Path) -> N
         assert ends(tmp_path / "out") == {"trial-0000": End.DURATION}
 
 
-def test_cars_are_placed_before_a_trial_and_time_stands_still_while_paused(
-    ros: Graph, tmp_path: Path
-) -> None:
+def test_cars_are_placed_before_a_trial_and_time_stands_still_while_paused(ros: Graph, tmp_path: Path) -> None:
     records = tmp_path / "out"
-    session = ros.session(
-        configuration(tmp_path, number_trials=1, duration=1.0), "--clock", "--records", records
-    )
+    session = ros.session(configuration(tmp_path, number_trials=1, duration=1.0), "--clock", "--records", records)
     status, out, err = finish(ros.client("place", "pause:5"))
     assert status == 0, err
     placed, paused = lines(out)

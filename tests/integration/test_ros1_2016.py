@@ -52,9 +52,7 @@ def busy(processes: int) -> Iterator[None]:
 
 def untimed(folder: Path, trials: int, seconds: int, **more: object) -> Path:
     """Write a configuration whose trials another maestro ends after so many seconds."""
-    document = json.loads(
-        configuration(folder, number_trials=trials, duration_bounds=[seconds] * 2).read_text()
-    )
+    document = json.loads(configuration(folder, number_trials=trials, duration_bounds=[seconds] * 2).read_text())
     del document["duration"]
     config = folder / "old.json"
     config.write_text(json.dumps(document | more))
@@ -126,9 +124,7 @@ def test_a_trial_is_whole_by_the_clock_of_the_maestro_though_the_cars_moved_for_
     config, records = untimed(tmp_path, 1, 3), tmp_path / "out"
     with graph(tmp_path) as ros:
         session, messages = under_the_maestro(ros, config, records)
-        ros.start(
-            [SYSTEM_PYTHON, ROOT / "tests" / "ros_2016.py", "1"], ROS_NAMESPACE="ego", PYTHONPATH=messages
-        )
+        ros.start([SYSTEM_PYTHON, ROOT / "tests" / "ros_2016.py", "1"], ROS_NAMESPACE="ego", PYTHONPATH=messages)
         read_until(session, "begins")
         session.send_signal(signal.SIGSTOP)
         time.sleep(1.2)

@@ -204,9 +204,7 @@ def test_a_bad_peer_ends_its_trial_by_name(bad: float | None, end: str, domain: 
     assert session.returncode == 1
 
 
-def test_faulty_clients_end_their_trials_and_the_session_goes_on(
-    domain: int, config: str, tmp_path: Path
-) -> None:
+def test_faulty_clients_end_their_trials_and_the_session_goes_on(domain: int, config: str, tmp_path: Path) -> None:
     document = json.loads(Path(config).read_text()) | {"duration_bounds": [60, 60]}
     Path(config).write_text(json.dumps(document))
     arguments = (
@@ -231,9 +229,7 @@ def test_faulty_clients_end_their_trials_and_the_session_goes_on(
     assert ends == ["peer_lost", "peer_silent", "peer_flood", "controller_fault", "reset"]
 
 
-def test_clients_that_go_less_than_the_silence_before_the_planned_end(
-    domain: int, config: str, tmp_path: Path
-) -> None:
+def test_clients_that_go_less_than_the_silence_before_the_planned_end(domain: int, config: str, tmp_path: Path) -> None:
     """Four seconds are shorter than the silence that is borne."""
     arguments = ("ros2", "run", config, "--trials", "3", "--records", str(tmp_path), "--json")
     with running(COMMAND, *arguments) as session:
@@ -278,8 +274,7 @@ def test_time_transforms_pausing_and_placing(domain: int, config: str, tmp_path:
         client.drive()
         _, err = session.communicate(timeout=600)
         times = [
-            message.clock.sec + 1e-9 * message.clock.nanosec
-            for message in client.graph.take(clocks, m.Clock, 1000)
+            message.clock.sec + 1e-9 * message.clock.nanosec for message in client.graph.take(clocks, m.Clock, 1000)
         ]
         told = client.graph.take(transforms, m.TFMessage, 1000)
         client.graph.close()
@@ -295,9 +290,7 @@ def test_time_transforms_pausing_and_placing(domain: int, config: str, tmp_path:
     assert moved.transform.translation.x == pytest.approx(float(record.frames.x[-1, 0]), abs=0.2)
 
 
-def test_an_interrupted_session_a_second_one_and_no_domain(
-    domain: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_an_interrupted_session_a_second_one_and_no_domain(domain: int, monkeypatch: pytest.MonkeyPatch) -> None:
     with running(COMMAND, "ros2", "run", "demo") as session:
         client = Client(domain)
         client.until(READY)
@@ -323,7 +316,5 @@ def test_the_example_passes_the_check() -> None:
         check=False, capture_output=True, text=True, timeout=600,
     )  # fmt: skip
     failed = [line for line in done.stdout.splitlines() if line.startswith("FAILED")]
-    assert all("answers in time" in line for line in failed), (
-        done.stdout + done.stderr
-    )  # the machine may be busy
+    assert all("answers in time" in line for line in failed), done.stdout + done.stderr  # the machine may be busy
     assert done.stdout.count("ok ") + len(failed) == 7

@@ -96,10 +96,7 @@ def closed(organiser: Person, numbers: dict[tuple[str, str], int]) -> None:
     """Close and reveal; disqualify who was hostile."""
     desk = "/desk/c/season"
     why = "it tried to get out"
-    assert (
-        organiser.post(f"/desk/s/{numbers['Wasps', 'test']}/disqualify", form=desk, why=why).status_code
-        == 303
-    )
+    assert organiser.post(f"/desk/s/{numbers['Wasps', 'test']}/disqualify", form=desk, why=why).status_code == 303
     assert organiser.post(f"{desk}/test/reveal", form=desk).status_code == 409
     for act in ("close", "reveal"):
         assert organiser.post(f"{desk}/test/{act}", form=desk).status_code == 303

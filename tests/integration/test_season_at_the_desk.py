@@ -124,9 +124,9 @@ def at_the_desk(browser: webdriver.Chrome, service: Service) -> None:
     browser.find_element(By.LINK_TEXT, "Prizes").click()
     shows(browser, "A cup")
     browser.get(f"{service.url}/desk/c/short")
-    Select(
-        browser.find_element(By.CSS_SELECTOR, '[aria-label="Built-in controller for test"]')
-    ).select_by_visible_text("lanes")
+    Select(browser.find_element(By.CSS_SELECTOR, '[aria-label="Built-in controller for test"]')).select_by_visible_text(
+        "lanes"
+    )
     button(browser, "Add baseline to test")
     browser.get(f"{service.url}/desk/log")
     for words in (
@@ -212,6 +212,4 @@ def without_a_server(browser: webdriver.Chrome, site: Path) -> None:
     assert browser.find_element(By.CSS_SELECTOR, "main").value_of_css_property("max-width") != "none"
     assert browser.find_element(By.LINK_TEXT, "revealed").is_displayed()
     browser.find_element(By.PARTIAL_LINK_TEXT, "best trial of Ants").click()
-    WebDriverWait(browser, WAIT_S).until(
-        lambda _: browser.execute_script("return window.replay?.ready === true")
-    )
+    WebDriverWait(browser, WAIT_S).until(lambda _: browser.execute_script("return window.replay?.ready === true"))

@@ -107,9 +107,7 @@ def test_after_the_close_rivals_and_replays_are_everybody_s(world: World) -> Non
     first, second, third = world.numbers["test"]
     act = "/desk/c/short/test/close"
     assert world.organiser.post(act, form=act).status_code == 303
-    everybody = wait_until(
-        lambda: "Places of test" in (text := world.service.person().get("/c/short").text) and text
-    )
+    everybody = wait_until(lambda: "Places of test" in (text := world.service.person().get("/c/short").text) and text)
     shown = set(re.findall(r"/s/(\d+)/trials/\d+\"", everybody))
     assert shown <= {str(second), str(third)}
     assert len(shown) == 2

@@ -93,9 +93,7 @@ def test_texts_dates_and_quotas_change_with_a_line_each(service: Service, organi
         ("was", "0" * 64, 409, "changed it meanwhile"),
     ],
 )
-def test_what_can_t_be_so_is_refused(
-    organiser: Person, field: str, value: str, status: int, said: str
-) -> None:
+def test_what_can_t_be_so_is_refused(organiser: Person, field: str, value: str, status: int, said: str) -> None:
     before = form_of(organiser)
     given = before | {field.replace("__", " "): value} | {"new text": "x"}
     answer = organiser.post(EDIT, form=EDIT, **given)
@@ -117,9 +115,7 @@ def test_what_can_t_be_so_is_refused(
         ("[phases.practice]", "limits = {memory = 512}\n[phases.practice]"),
     ],
 )
-def test_what_decides_trials_and_places_is_locked(
-    service: Service, organiser: Person, before: str, after: str
-) -> None:
+def test_what_decides_trials_and_places_is_locked(service: Service, organiser: Person, before: str, after: str) -> None:
     text = (service.folder.parent / "short.toml").read_text()
     assert before in text
     if after.startswith("limits"):
@@ -191,9 +187,7 @@ def test_baselines_stand_apart_and_a_phase_opens_again_until_its_reveal(
     assert "does not count" in asked
     assert organiser.post(f"{act}/close", form=f"{act}/close").status_code == 303
     places = wait_until(
-        lambda: (
-            len(service.person().api("GET", path).json()) == 2 and service.person().api("GET", path).json()
-        )
+        lambda: len(service.person().api("GET", path).json()) == 2 and service.person().api("GET", path).json()
     )
     assert [(own["place"], own["entry"]) for own in places] == [(1, "Ants"), (None, "built-in lanes")]
     assert places[1]["mean"] >= places[0]["mean"]
@@ -228,9 +222,7 @@ def test_every_act_that_others_notice_asks_once(service: Service, organiser: Per
     given = {"title": "Fog", "text": "Drive slowly."}
     assert organiser.post("/desk/news/short", form=DESK, **given).status_code == 303
     desk = organiser.get(DESK).text + organiser.get("/desk").text
-    for path in re.findall(
-        r'<form[^>]* action="([^"]+/(?:open|close|reveal|reopen|disqualify|remove))"', desk
-    ):
+    for path in re.findall(r'<form[^>]* action="([^"]+/(?:open|close|reveal|reopen|disqualify|remove))"', desk):
         asked = organiser.get(path)
         assert asked.status_code == 200
         assert f'<form method="post" action="{path}">' in asked.text
@@ -246,9 +238,7 @@ def test_every_act_that_others_notice_asks_once(service: Service, organiser: Per
 def archived(service: Service, organiser: Person, tmp_path: Path) -> None:
     """A finished competition is a site that needs no server."""
     bees = service.person().join(organiser.invite(), "Bea", "Bees")
-    number = bees.submit(
-        "short/validation", CRASHING.replace("def start", "said = 'swordfish'\n\n    def start")
-    )
+    number = bees.submit("short/validation", CRASHING.replace("def start", "said = 'swordfish'\n\n    def start"))
     bees.ended(number)
     place = f"{DESK}/archive.zip"
     refused = organiser.get(place)

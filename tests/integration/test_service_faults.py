@@ -119,9 +119,7 @@ def test_the_server_killed_in_uploads(tmp_path: Path, settings: str) -> None:
 
 
 def test_told_to_end_it_gives_back_what_is_on_lease(tmp_path: Path) -> None:
-    with season(
-        tmp_path, "--workers", "1", settings=SETTINGS.replace("2.0", "600.0"), trials=TRIALS
-    ) as service:
+    with season(tmp_path, "--workers", "1", settings=SETTINGS.replace("2.0", "600.0"), trials=TRIALS) as service:
         organiser = service.organiser()
         person = service.person().join(organiser.invite(), "Ann", "Ants")
         number = person.submit("short/practice", STANDING)

@@ -53,18 +53,12 @@ def test_a_participant_from_the_invitation_to_the_replay(
     WebDriverWait(browser, WAIT_S).until(lambda _: "/s/" in browser.current_url)
     browser.execute_script("window.same = true")
     WebDriverWait(browser, WAIT_S).until(lambda _: browser.find_elements(By.CSS_SELECTOR, ".tag.done"))
-    assert browser.execute_script("return window.same"), (
-        "the page was loaded anew; htmx should have changed it"
-    )
+    assert browser.execute_script("return window.same"), "the page was loaded anew; htmx should have changed it"
     browser.find_element(By.LINK_TEXT, "1").click()
-    frame = WebDriverWait(browser, WAIT_S).until(
-        lambda _: browser.find_element(By.CSS_SELECTOR, "iframe.replay")
-    )
+    frame = WebDriverWait(browser, WAIT_S).until(lambda _: browser.find_element(By.CSS_SELECTOR, "iframe.replay"))
     assert frame.get_attribute("sandbox") == "allow-scripts"
     browser.switch_to.frame(frame)
-    WebDriverWait(browser, WAIT_S).until(
-        lambda _: browser.execute_script("return window.replay?.ready === true")
-    )
+    WebDriverWait(browser, WAIT_S).until(lambda _: browser.execute_script("return window.replay?.ready === true"))
     with pytest.raises(Exception, match=r"(?i)cookie|denied|sandbox"):
         browser.execute_script("return document.cookie")
     browser.switch_to.default_content()

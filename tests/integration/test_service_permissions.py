@@ -171,8 +171,7 @@ def test_the_table_names_every_route(tmp_path: Path) -> None:
         (method, route.path_format.replace("//", "/"))
         for route in app.routes
         for method in getattr(route, "methods", ())
-        if method not in ("OPTIONS", "HEAD")
-        and not route.path.startswith(("/static", "/api/openapi", "/api:"))
+        if method not in ("OPTIONS", "HEAD") and not route.path.startswith(("/static", "/api/openapi", "/api:"))
     }
     stored.close()
     named = {(method, re.sub(r":\w+}", "}", path)) for method, path in ROUTES}
@@ -196,9 +195,7 @@ def test_an_organiser_of_one_competition_makes_organisers_of_that_alone(world: W
     one = world.people[ONE]
     desk = one.get("/desk").text
     assert "/desk/c/short" in desk
-    assert all(
-        word not in desk for word in ("/desk/c/other", "Workers", "People", "Log of acts", "/desk/create")
-    )
+    assert all(word not in desk for word in ("/desk/c/other", "Workers", "People", "Log of acts", "/desk/create"))
     second = world.service.person().join(one.invite("organiser", "other"), "Oda")
     assert second.get("/desk/c/short").status_code == 200
     assert second.get("/desk/c/other").status_code == second.get("/desk/log").status_code == 403
@@ -225,9 +222,7 @@ def test_a_form_without_its_hidden_field_is_refused(world: World) -> None:
 def test_an_invitation_ends_when_it_is_revoked(world: World, role: str) -> None:
     team, page = world.people[TEAM], "/team" if role == TEAM else "/desk"
     code = shown_secret(team.post("/team/invite", form="/team"))
-    number = max(
-        map(int, re.findall(rf'"{page}/invitations/(\d+)/revoke"', world.people[role].get(page).text))
-    )
+    number = max(map(int, re.findall(rf'"{page}/invitations/(\d+)/revoke"', world.people[role].get(page).text)))
     other = world.people[OTHER].post(f"/team/invitations/{number}/revoke", form="/team")
     assert other.status_code == 400
     assert world.people[role].post(f"{page}/invitations/{number}/revoke", form=page).status_code == 303
@@ -261,13 +256,8 @@ def test_a_session_ends_with_its_password(world: World) -> None:
     first = world.service.person().join(organiser.invite(), "Cid", "Cats").with_token()
     second = world.service.person()
     assert second.login("Cid").status_code == 303
-    assert (
-        second.post("/team/password", form="/team", password="wrong wrong", new="another secret").status_code
-        == 400
-    )
-    answer = second.post(
-        "/team/password", form="/team", password="correct horse battery", new="another secret"
-    )
+    assert second.post("/team/password", form="/team", password="wrong wrong", new="another secret").status_code == 400
+    answer = second.post("/team/password", form="/team", password="correct horse battery", new="another secret")
     assert answer.status_code == 303
     assert second.get("/team").status_code == 200
     assert first.get("/team").status_code == 302
@@ -302,9 +292,7 @@ def test_an_invitation_is_good_once_and_a_member_invites_to_the_team(world: Worl
     code = shown_secret(team.post("/team/invite", form="/team"))
     world.service.person().join(code, "Eve")
     assert "Eve" in team.get("/team").text
-    used = world.service.person().post(
-        "/join", form="/join", code=code, name="Fay", password="0123456789", team=""
-    )
+    used = world.service.person().post("/join", form="/join", code=code, name="Fay", password="0123456789", team="")
     assert used.status_code == 200
     assert "used or expired" in used.text
     name = world.service.person().post(

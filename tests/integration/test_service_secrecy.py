@@ -130,9 +130,7 @@ def test_nothing_of_a_secret_phase_is_written_in_clear_in_sqlite(tmp_path: Path)
     a_season(tmp_path, "", [])
 
 
-def test_nothing_of_a_secret_phase_is_written_in_clear_in_postgresql(
-    tmp_path: Path, open_folder: Path
-) -> None:
+def test_nothing_of_a_secret_phase_is_written_in_clear_in_postgresql(tmp_path: Path, open_folder: Path) -> None:
     with postgres.cluster(open_folder) as cluster:
         a_season(tmp_path, f'database = "{cluster.url("secrecy")}"\n', [open_folder])
 
@@ -203,9 +201,7 @@ def a_season(tmp_path: Path, settings: str, also: list[Path]) -> None:
         unreadable(folder, tmp_path / "other.key", numbers[2])
         for act in ("close", "reveal"):
             assert organiser.post(f"/desk/c/short/test/{act}", form="/desk/c/short").status_code == 303
-        assert [Path(one).name for one in holding(looked_at, set(forms(seeds["test"][0])))] == [
-            "test.seeds.txt"
-        ]
+        assert [Path(one).name for one in holding(looked_at, set(forms(seeds["test"][0])))] == ["test.seeds.txt"]
         shown_to_all(service.person(), seeds["test"], numbers[2:])
         others_see_no_words(service.person().join(organiser.invite(), "Bob", "Bees"), numbers[3])
         told = person.get(f"/s/{numbers[3]}/trials/0").text

@@ -120,9 +120,7 @@ def test_without_a_terminal_a_key_file_is_asked_for(tmp_path: Path, given: str) 
     assert setsid is not None
     ran = subprocess.run([setsid, "-w", *command], input=given, capture_output=True, text=True, check=False)
     assert ran.returncode == 2
-    assert ran.stderr.startswith(
-        "dubins-traffic: --key-file: no passphrase was typed, nor is a key file named"
-    )
+    assert ran.stderr.startswith("dubins-traffic: --key-file: no passphrase was typed, nor is a key file named")
     assert len(ran.stderr.splitlines()) == 1
     assert not (tmp_path / "sealed").exists()
     key = tmp_path.with_suffix(".key")

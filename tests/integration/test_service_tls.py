@@ -54,9 +54,7 @@ def test_people_and_clients_come_by_https(tmp_path: Path) -> None:
     url = f"https://localhost:{port}"
     (tmp_path / "short.toml").write_text(competition_text())
     arguments = ("--workers", "0", "--competition", str(tmp_path / "short.toml"))
-    with serving(
-        tmp_path / "here", *arguments, settings=f'url = "{url}"\nlogins = 6\n', behind=True
-    ) as service:
+    with serving(tmp_path / "here", *arguments, settings=f'url = "{url}"\nlogins = 6\n', behind=True) as service:
         configuration = proxy_file(tmp_path, port, service.url)
         proxy = subprocess.Popen([NGINX, "-p", str(tmp_path), "-c", str(configuration), "-g", "daemon off;"])
         try:
@@ -76,9 +74,7 @@ def checked(url: str, code: str, trusted: ssl.SSLContext) -> None:
     wait_until(is_there)
     organiser = Person(url, verify=trusted)
     organiser.join(code, "Olga")
-    cookies = [
-        cookie for cookie in organiser.http.cookies.jar if cookie.name in ("__Host-session", "__Host-csrf")
-    ]
+    cookies = [cookie for cookie in organiser.http.cookies.jar if cookie.name in ("__Host-session", "__Host-csrf")]
     assert len(cookies) == 2
     assert all(cookie.secure for cookie in cookies)
     assert f"{url}/join?code=" in organiser.post("/desk/invite", form="/desk", role="participant").text

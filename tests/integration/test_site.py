@@ -94,9 +94,7 @@ def test_every_page_is_reached_from_the_first_one(pages: dict[Path, Page], site:
         found = {leads(path, link)[0] for link in pages[path].links if not urlsplit(link).scheme}
         left += (found & pages.keys()) - met
         met |= found & pages.keys()
-    shown = {
-        site / path.relative_to(ROOT / "docs").with_suffix(".html") for path in (ROOT / "docs").rglob("*.md")
-    }
+    shown = {site / path.relative_to(ROOT / "docs").with_suffix(".html") for path in (ROOT / "docs").rglob("*.md")}
     assert shown - met == {site / "package.html"}
 
 
@@ -136,11 +134,7 @@ def test_nothing_is_fetched_from_another_host(pages: dict[Path, Page], site: Pat
 
 
 def test_every_trial_of_the_gallery_has_a_page(pages: dict[Path, Page], site: Path) -> None:
-    shown = {
-        leads(site / "gallery.html", link)[0]
-        for link in pages[site / "gallery.html"].links
-        if "gallery/" in link
-    }
+    shown = {leads(site / "gallery.html", link)[0] for link in pages[site / "gallery.html"].links if "gallery/" in link}
     assert {path.resolve() for path in (site / "gallery").iterdir()} == shown
     assert len(shown) >= 21
 
@@ -149,9 +143,7 @@ def rows_of(text: str, heading: str) -> dict[str, list[str]]:
     """Return the cells of the first table below a heading, by the first of each row."""
     part = text.partition(f'<section id="{heading}">')[2].partition("</table>")[0]
     lines = re.findall(r"<tr[^>]*>(.*?)</tr>", part, re.DOTALL)
-    cells = [
-        [re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", line)] for line in lines
-    ]
+    cells = [[re.sub(r"<[^>]+>", "", cell) for cell in re.findall(r"<td[^>]*>(.*?)</td>", line)] for line in lines]
     return {line[0]: line[1:] for line in cells if line}
 
 
@@ -208,9 +200,7 @@ def test_a_page_asks_for_files_beside_it_alone(name: str, site: Path, browser: w
     assert browser.execute_script(width) <= 0
     events = [json.loads(line["message"])["message"] for line in browser.get_log("performance")]
     sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
-    asked = [
-        one["request"]["url"] for one in sent if not one["request"]["url"].startswith(("data:", "chrome:"))
-    ]
+    asked = [one["request"]["url"] for one in sent if not one["request"]["url"].startswith(("data:", "chrome:"))]
     assert len(asked) > 3
     assert [address for address in asked if not address.startswith(site.as_uri())] == []
     assert [said["message"] for said in browser.get_log("browser") if said["level"] == "SEVERE"] == []
@@ -247,9 +237,7 @@ def test_every_page_can_be_read_at_both_widths_and_in_both_themes(
 
 @pytest.mark.tools("browser")
 @pytest.mark.parametrize("name", ["task", "watch", "maps", "falsify"])
-def test_words_in_pictures_are_large_enough_on_a_narrow_page(
-    name: str, site: Path, browser: webdriver.Chrome
-) -> None:
+def test_words_in_pictures_are_large_enough_on_a_narrow_page(name: str, site: Path, browser: webdriver.Chrome) -> None:
     """A drawing is as large as it was drawn and moves sideways, and so is a picture of a page, up to 656 pixels."""
     widen(browser, WIDTHS[1])
     browser.get((site / f"{name}.html").as_uri())

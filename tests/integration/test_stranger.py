@@ -51,9 +51,7 @@ def test_the_first_page_leads_there() -> None:
     """It installs what `installed` does, and links to each step; the last one names its program."""
     page = (ROOT / "website" / "index.md").read_text(encoding="utf-8")
     assert "\npip install '.[campaign,compile,pandas]'\n" in page
-    places = [page.index(f"(tutorials/{name}.md)") for name in STEPS] + [
-        page.index("(foreign-strategies.md)")
-    ]
+    places = [page.index(f"(tutorials/{name}.md)") for name in STEPS] + [page.index("(foreign-strategies.md)")]
     assert places == sorted(places)
     last = (ROOT / "docs" / "foreign-strategies.md").read_text(encoding="utf-8")
     assert "python examples/foreign_synthesis.py --tulip " in last

@@ -97,9 +97,7 @@ class Textbook:
     def letter(self, state: Any) -> dict[str, bool]:
         width = max(1, (self.board.road_cells.cells - 1).bit_length())
         _, *others = self.cells(state)
-        letter = {
-            f"car{k}_{bit}": bool(cell >> bit & 1) for k, cell in enumerate(others, 1) for bit in range(width)
-        }
+        letter = {f"car{k}_{bit}": bool(cell >> bit & 1) for k, cell in enumerate(others, 1) for bit in range(width)}
         for i, j in product(range(1, len(others) + 1), repeat=2):
             if i < j and self.game.order != "none":
                 lines = [order for _, order in state[1] if i in order and j in order]
@@ -297,9 +295,7 @@ def test_a_strategy_of_ours_wins_and_loses_with_one_rank_changed(
                 rank[draw.randrange(len(rank))] = draw.randrange(-1, 12)
         changed = Strategy(
             strategy.board,
-            tuple(
-                type(own)(rank, own.start, own.debt) for own, rank in zip(strategy.ranks, ranks, strict=True)
-            ),
+            tuple(type(own)(rank, own.start, own.debt) for own, rank in zip(strategy.ranks, ranks, strict=True)),
         )
         player = RankedPlayer(named, changed, solution.game.ego_cell)
         found = checked(book, solution, player, state)
@@ -371,9 +367,7 @@ def test_two_hundred_files_of_four_tools_have_the_verdict_of_playing_everything(
     assert all(min(counts) > 0 for counts in wins.values())
 
 
-@pytest.mark.parametrize(
-    "form", [FORMS[0], *(pytest.param(own, marks=pytest.mark.long) for own in FORMS[1:])]
-)
+@pytest.mark.parametrize("form", [FORMS[0], *(pytest.param(own, marks=pytest.mark.long) for own in FORMS[1:])])
 def test_every_strategy_that_loses_loses_on_the_road_to_its_counter_play(
     form: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -527,12 +521,7 @@ def test_the_command_tells_who_wins(
     assert main(["check", next(map(str, Path("lost").glob("*.mcap")))]) == 0
     assert "0 rounds" in capsys.readouterr().out
     assert main([*line, "--check", str(bad), *shown]) == 2
-    assert (
-        main(
-            [*line, "--check", str(bad), "--counter-trial", "play.json", "--counter-play", "play.json", "-F"]
-        )
-        == 2
-    )
+    assert main([*line, "--check", str(bad), "--counter-trial", "play.json", "--counter-play", "play.json", "-F"]) == 2
     assert main([*line, "--counter-trial", "other.json"]) == 2
     assert "--counter-trial: no strategy to be checked" in capsys.readouterr().err
     damaged = json.loads(Path("lost.json").read_text())

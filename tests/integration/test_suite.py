@@ -151,9 +151,7 @@ class Mine:
 
 
 @pytest.mark.parametrize("kind", ["trials", "cases"])
-def test_a_controller_that_is_not_ours_runs_in_a_box_and_the_results_say_so(
-    kind: str, tmp_path: Path
-) -> None:
+def test_a_controller_that_is_not_ours_runs_in_a_box_and_the_results_say_so(kind: str, tmp_path: Path) -> None:
     file = written(tmp_path / "suite.json", document() if kind == "trials" else cases())
     (tmp_path / "mine.py").write_text(SEES_ITSELF)
     words = ["run", file, "--controller", "mine.py:Mine", "--controller", "rules", "--workers", "1"]
@@ -176,9 +174,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
     (tmp_path / "slow.py").write_text(SLOW)
     out = tmp_path / "out"
     words = [COMMAND, "suite", "run", str(file), "-o", str(out), "--workers", "1", "--in-process"]
-    with subprocess.Popen(
-        words, stderr=subprocess.PIPE, text=True, cwd=tmp_path, start_new_session=True
-    ) as process:
+    with subprocess.Popen(words, stderr=subprocess.PIPE, text=True, cwd=tmp_path, start_new_session=True) as process:
         assert process.stderr is not None
         while not list(out.glob("parts/[0-9]*.parquet")) and process.poll() is None:
             time.sleep(0.02)
@@ -200,9 +196,7 @@ def test_ctrl_c_keeps_what_is_finished(tmp_path: Path) -> None:
 def interrupted(words: list[str], folder: Path, kept: Path) -> str:
     """Press Ctrl-C as soon as something is kept; return what the command says."""
     command = [COMMAND, "suite", "run", *words]
-    with subprocess.Popen(
-        command, stderr=subprocess.PIPE, text=True, cwd=folder, start_new_session=True
-    ) as process:
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True, cwd=folder, start_new_session=True) as process:
         assert process.stderr is not None
         while not (kept.exists() and kept.read_text().count("\n") > 1) and process.poll() is None:
             time.sleep(0.01)

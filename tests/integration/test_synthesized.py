@@ -107,8 +107,6 @@ def test_a_file_that_is_no_strategy_is_refused(tmp_path: Path) -> None:
 
 def test_without_others_or_goals_it_drives_as_rules() -> None:
     own = draw(load_config("demo"), 1, 0)
-    alone = replace(
-        own, duration=20.0, e_agents=(), starts=own.starts[:1], problem=replace(own.problem, e_agents=())
-    )
+    alone = replace(own, duration=20.0, e_agents=(), starts=own.starts[:1], problem=replace(own.problem, e_agents=()))
     ours, rules = (run_trial(alone, name).score for name in ("synthesized", "rules"))
     assert ours.driven == rules.driven

@@ -116,9 +116,7 @@ def test_json_for_machines(run: Run, record: Path) -> None:
 def test_the_instance_that_was_to_be_run(run: Run, config: Path, record: Path) -> None:
     assert "verified" in run("verify", record, "--configuration", config, "--seed", "4")
     assert "instance." in run("verify", record, "--configuration", config, "--seed", "5", status=1)
-    assert "instance." in run(
-        "verify", record, "--configuration", config, "--seed", "4", "--trial", "1", status=1
-    )
+    assert "instance." in run("verify", record, "--configuration", config, "--seed", "4", "--trial", "1", status=1)
     given = dt.draw(dt.load_config(config), 4, 0)
     Path("given.json").write_text(json.dumps(instance_to_document(given)))
     assert "verified" in run("verify", record, "--instance", "given.json")
@@ -128,9 +126,7 @@ def test_the_instance_that_was_to_be_run(run: Run, config: Path, record: Path) -
     told = run("verify", "there.mcap", "--instance", "given.json", status=1)
     assert "instance.simulator: recorded gazebo, expected embedded" in told
     run("verify", "there.mcap", "--instance", "given.json", "--simulator", "gazebo")
-    assert "two sources" in run(
-        "verify", record, "--instance", "given.json", "--configuration", config, status=2
-    )
+    assert "two sources" in run("verify", record, "--instance", "given.json", "--configuration", config, status=2)
     assert "needs more" in run("verify", record, "--trial", "1", status=2)
 
 

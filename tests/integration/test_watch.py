@@ -40,9 +40,7 @@ class Program:
 
     def __init__(self, folder: Path, *arguments: str) -> None:
         command = [sys.executable, "-m", "dubins_traffic.cli", *arguments]
-        self.process = subprocess.Popen(
-            command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-        )
+        self.process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.told = ""
         assert self.process.stderr is not None
         for line in self.process.stderr:
@@ -57,9 +55,7 @@ class Program:
     def get(self, target: str, **headers: str) -> tuple[int, dict[str, str], str]:
         """Send a request byte by byte as it is written here, and return status, headers and body."""
         lines = {"Host": self.url.netloc, **({"Cookie": self.cookie} if self.cookie else {}), **headers}
-        return exchange(
-            self.url, f"GET {target} HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in lines.items())
-        )
+        return exchange(self.url, f"GET {target} HTTP/1.1\r\n" + "".join(f"{k}: {v}\r\n" for k, v in lines.items()))
 
     def enter(self) -> str:
         """Exchange the token and return the page."""

@@ -125,9 +125,7 @@ def test_a_town_gets_as_many_pictures_as_an_empty_canvas_and_every_tick(
         assert browser.get_log("browser") == []
 
 
-def test_trials_follow_one_another_and_the_page_keeps_the_last(
-    browser: webdriver.Chrome, tmp_path: Path
-) -> None:
+def test_trials_follow_one_another_and_the_page_keeps_the_last(browser: webdriver.Chrome, tmp_path: Path) -> None:
     with running(tmp_path, "watch", "short.json", "--controller", "simple") as program:
         enter(browser, program)
         until(
@@ -143,9 +141,7 @@ def test_trials_follow_one_another_and_the_page_keeps_the_last(
     assert browser.get_log("browser") == []
 
 
-def test_who_looks_back_stays_there_until_he_wants_to_see_the_newest(
-    browser: webdriver.Chrome, tmp_path: Path
-) -> None:
+def test_who_looks_back_stays_there_until_he_wants_to_see_the_newest(browser: webdriver.Chrome, tmp_path: Path) -> None:
     with running(tmp_path, "watch", "junction", "--trials", "1", "--pace", "4") as program:
         enter(browser, program)
         until(browser, "replay.frames > 120")
@@ -157,9 +153,7 @@ def test_who_looks_back_stays_there_until_he_wants_to_see_the_newest(
         element(browser, "now").send_keys(" ")
 
 
-def test_keys_pad_and_touch_drive_and_breaches_are_shown_at_once(
-    browser: webdriver.Chrome, tmp_path: Path
-) -> None:
+def test_keys_pad_and_touch_drive_and_breaches_are_shown_at_once(browser: webdriver.Chrome, tmp_path: Path) -> None:
     with running(tmp_path, "play", "junction", "-o", "mine.mcap") as program:
         enter(browser, program)
         until(browser, "document.body.classList.contains('drives')")
@@ -240,9 +234,7 @@ def test_a_page_that_is_loaded_again_goes_on_and_one_that_is_closed_ends_it(
     assert ending.end.value == "interrupted"
 
 
-def test_a_scripted_driver_makes_a_clean_lap_by_key_presses_alone(
-    browser: webdriver.Chrome, tmp_path: Path
-) -> None:
+def test_a_scripted_driver_makes_a_clean_lap_by_key_presses_alone(browser: webdriver.Chrome, tmp_path: Path) -> None:
     instance = replace(draw(load_config("junction"), 0, 0), duration=70.0)
     laps: list[int] = []
     for attempt in range(3):  # on a busy machine a key may come late

@@ -35,9 +35,7 @@ LONG = RoadNetwork.from_document(
 )
 
 
-@given(
-    angle, st.floats(0.0, 1.2), angle, angle, st.floats(0.0, 0.6), st.floats(0.0, 0.4), st.floats(0.01, 0.2)
-)
+@given(angle, st.floats(0.0, 1.2), angle, angle, st.floats(0.0, 0.6), st.floats(0.0, 0.4), st.floats(0.01, 0.2))
 @settings(max_examples=300, deadline=None, derandomize=True)
 def test_sight_agrees_with_shapely(heading, distance, bearing, turned, a, b, r) -> None:
     box = Polygon([(a, b), (-a, b), (-a, -b), (a, -b)]) if a > 0 < b else Point(0, 0)
@@ -49,9 +47,7 @@ def test_sight_agrees_with_shapely(heading, distance, bearing, turned, a, b, r) 
     if math.isnan(nearest):
         assert not seen or body.buffer(1e-4).intersects(rotate(WEDGE, heading, (0, 0), use_radians=True))
     elif abs(nearest - 0.5) > 1e-4:
-        assert seen == (nearest < 0.5) or body.buffer(-1e-4).disjoint(
-            rotate(WEDGE, heading, (0, 0), use_radians=True)
-        )
+        assert seen == (nearest < 0.5) or body.buffer(-1e-4).disjoint(rotate(WEDGE, heading, (0, 0), use_radians=True))
 
 
 @pytest.mark.parametrize("network", [GRID, LONG, RoadNetwork.grid(2, 5, 2.6, (0.0, 0.0, -2.0))])
@@ -84,9 +80,7 @@ def test_wander_works_at_any_rate(rate) -> None:
 
 
 def test_traffic_alone_has_no_collisions() -> None:
-    kinds = (
-        [("wander", {})] * 3 + [("wander", {"patience": 1.0})] * 3 + [("parked", {"vacates_after": 5.0})] * 2
-    )
+    kinds = [("wander", {})] * 3 + [("wander", {"patience": 1.0})] * 3 + [("parked", {"vacates_after": 5.0})] * 2
     ring = [("loop", {"cycle": [[0, 0], [1, 0], [1, 1], [0, 1]]})] * 2
     batch = [crowd(kinds + ring, trial=trial) for trial in range(30)]
     assert run(batch, 30 * 60)[1] == []
@@ -185,9 +179,7 @@ def test_a_rigid_motion_of_the_network_commutes() -> None:
     ends = []
     for network in (GRID, RoadNetwork.grid(3, 4, 3.0, motion)):
         placed = crowd(kinds, network).starts
-        state, _ = run(
-            [instance(kinds, [in_lane(network, 9, 0.3), *placed[1:]], network)], 900, ego=[(0.4, 0.0)] * 100
-        )
+        state, _ = run([instance(kinds, [in_lane(network, 9, 0.3), *placed[1:]], network)], 900, ego=[(0.4, 0.0)] * 100)
         ends.append((state.x[0], state.y[0]))
     (x, y), (moved_x, moved_y) = ends
     c, s = math.cos(motion[2]), math.sin(motion[2])

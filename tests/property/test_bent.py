@@ -77,9 +77,7 @@ def test_a_rigid_motion_of_the_map_commutes_with_a_trial(network: Any, tmp_path:
     away = [turn * complex(disc.x, disc.y) + SHIFT for disc in discs]
     beside = tuple(DiscObstacle(spot.real, spot.imag, 0.1) for spot in away)
     here = replace(here, problem=replace(here.problem, obstacles=tuple(discs)))
-    there = replace(
-        here, problem=replace(here.problem, network=moved, obstacles=beside), starts=tuple(starts)
-    )
+    there = replace(here, problem=replace(here.problem, network=moved, obstacles=beside), starts=tuple(starts))
     frames: list[Frames] = []
     verdicts: list[Any] = []
     for k, found in enumerate((here, there)):

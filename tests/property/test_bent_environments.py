@@ -95,9 +95,7 @@ def test_the_way_to_a_goal_falls_by_what_is_driven_along_the_curves() -> None:
 
 
 def test_an_episode_on_curves_is_the_trial_that_it_cites(tmp_path: Path) -> None:
-    config = _configured(
-        network=RING, **{"e-agents": [{"type": "lawful", "name": "car", "count": 2}], "duration": 8}
-    )
+    config = _configured(network=RING, **{"e-agents": [{"type": "lawful", "name": "car", "count": 2}], "duration": 8})
     env = vector(2, config, autoreset_mode=AutoresetMode.DISABLED)
     seen, info = env.reset(seed=3)
     instance = info["trial"][1]

@@ -79,9 +79,7 @@ def driven(instances: Sequence[Instance], first: int, keeps_ego: bool) -> tuple[
         asked = drivers.ask(tick, views.state, views.labels, law).reshape(trials, cars, 2)
         group.commands[:] = np.where(np.isfinite(asked), asked, 0.0) if not keeps_ego else asked
         group.commands[~kept] = np.nan_to_num(group.commands[~kept], nan=0.0, posinf=1.0, neginf=-1.0)
-        found = shields.filter(
-            np.where([one is None for one in group.endings], group.ticks, -1), group.commands
-        )
+        found = shields.filter(np.where([one is None for one in group.endings], group.ticks, -1), group.commands)
         reasons |= {REASONS[code] for code in np.unique(found).tolist()}
         group.advance()
         views.look(np.arange(trials))
@@ -96,9 +94,7 @@ def test_no_e_agent_under_a_shield_breaks_e1_or_e2_however_all_are_driven(keeps_
     kept = [one for own in found for one in own if one.rule in KEPT and (keeps_ego or one.car > 0)]
     assert kept == []
     assert {"1.collision", "1.road", "2.left", "2.turn", "3.stop"} <= reasons
-    assert keeps_ego or any(one.car == 0 for own in found for one in own), (
-        "the ego drives well: nothing is tried"
-    )
+    assert keeps_ego or any(one.car == 0 for own in found for one in own), "the ego drives well: nothing is tried"
 
 
 NUMBER = st.floats(-1.0, 1.0)
@@ -146,8 +142,7 @@ def test_a_cars_shield_does_as_that_of_an_ego_which_is_told_the_same() -> None:
         asked: Floats = drivers.ask(tick, views.state, views.labels, law)
         told = [one.observe(tick, group.state, group.labels) for one in senses]
         wanted = [
-            own.filter(seen, (float(u), float(w)))
-            for own, seen, (u, w) in zip(filters, told, asked, strict=True)
+            own.filter(seen, (float(u), float(w))) for own, seen, (u, w) in zip(filters, told, asked, strict=True)
         ]
         group.commands[0] = asked
         reasons = shields.filter(group.ticks, group.commands)

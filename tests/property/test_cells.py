@@ -49,13 +49,9 @@ def test_a_point_lies_on_each_of_several_networks_where_it_would_on_that_alone()
         assert np.array_equal(together.pave[first : first + len(alone.pave)], alone.pave)
 
 
-@pytest.mark.parametrize(
-    ("count", "roads", "bent"), [(2, 1, 0.0), (20, 26, 0.0), (20, 26, 0.6), (150, 210, 0.3)]
-)
+@pytest.mark.parametrize(("count", "roads", "bent"), [(2, 1, 0.0), (20, 26, 0.0), (20, 26, 0.6), (150, 210, 0.3)])
 @pytest.mark.parametrize("half_width", [0.05, 0.6, 3.0])
-def test_a_point_lies_where_it_would_without_cells(
-    count: int, roads: int, bent: float, half_width: float
-) -> None:
+def test_a_point_lies_where_it_would_without_cells(count: int, roads: int, bent: float, half_width: float) -> None:
     network = generate(count, roads, 7, rigid_motion=True, bent=bent)
     with_cells = pack([network], [half_width])
     grid = join([with_cells.grid])

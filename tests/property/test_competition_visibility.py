@@ -64,9 +64,7 @@ def test_other_seeds_change_no_byte_of_a_secret_phase(
 
 @settings(deadline=None, derandomize=True)
 @given(trials, trials)
-def test_how_a_submission_ended_is_not_seen_of_a_secret_phase(
-    first: list[Judged], second: list[Judged]
-) -> None:
+def test_how_a_submission_ended_is_not_seen_of_a_secret_phase(first: list[Judged], second: list[Judged]) -> None:
     phase = FOUND.phase("test")
     done = visible(phase, SubmissionState("done"), first, now=WITHIN)
     failed = visible(phase, SubmissionState("failed", "crashed in trial 3", "submission"), second, now=WITHIN)

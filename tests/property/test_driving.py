@@ -215,9 +215,7 @@ def drive(controller: Lanes, car: Car, pose: tuple[float, float, float, float], 
     """Drive alone, by the exact motion, and return the poses."""
     poses = [pose]
     for tick in range(ticks):
-        seen = Observation(
-            tick, tick / 30, Pose(*poses[-1]), Twist(0.0, 0.0), Propositions(0, -1, -1, -1, 0), (), None
-        )
+        seen = Observation(tick, tick / 30, Pose(*poses[-1]), Twist(0.0, 0.0), Propositions(0, -1, -1, -1, 0), (), None)
         u, w = controller.act(seen)
         low, most = car.bounds.speed_low, car.bounds.yaw_rate
         u = min(max(u, low), car.bounds.speed)

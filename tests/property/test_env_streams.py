@@ -35,9 +35,7 @@ def streams(envs: int, watched: list[int], mode: AutoresetMode, **given: Any) ->
             seen, info = env.reset(options={"reset_mask": over})
             for k in np.flatnonzero(over & np.isin(np.arange(envs), watched)).tolist():
                 found[k].append((seen[k].tobytes(), info["trial"][k].trial))
-        seen, reward, terminated, truncated, info = env.step(
-            np.stack([weaving(step, k) for k in range(envs)])
-        )
+        seen, reward, terminated, truncated, info = env.step(np.stack([weaving(step, k) for k in range(envs)]))
         over = terminated | truncated
         for k in watched:
             terms = info["reward_terms"][k].tobytes()
@@ -145,9 +143,7 @@ def test_an_episode_is_the_trial_that_it_cites(
     assert records[0].read_bytes() == records[1].read_bytes()
     assert replace(result.score, record=None, time_to_begin_s=None) == info["outcome"][1].score
     told = read(records[0]).frames
-    for place, name in enumerate(
-        ("x", "y", "c", "s", "speed", "yaw_rate", "segment", "at", "crosses", "lane", "bits")
-    ):
+    for place, name in enumerate(("x", "y", "c", "s", "speed", "yaw_rate", "segment", "at", "crosses", "lane", "bits")):
         assert np.array_equal(getattr(told, name)[skip::skip], np.array([own[place] for own in frames])), name
     assert player.seen[::skip] == seens[:-1]
 

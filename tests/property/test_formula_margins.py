@@ -105,10 +105,7 @@ def test_margins_are_lengths_and_times_that_can_be_worked_out() -> None:
     least = float((apart - problem.intersection_radius).min())
     assert judged("[] !ego_t_1_1", own).robustness == (least if least > 0.0 else min(least, -1e-9))
     body = problem.car.body.reach
-    gaps = (
-        np.sqrt((frames.x[:, 1:] - frames.x[:, :1]) ** 2 + (frames.y[:, 1:] - frames.y[:, :1]) ** 2)
-        - 2 * body
-    )
+    gaps = np.sqrt((frames.x[:, 1:] - frames.x[:, :1]) ** 2 + (frames.y[:, 1:] - frames.y[:, :1]) ** 2) - 2 * body
     found = judged("[] !collision_ego", own)
     assert found.robustness is not None
     assert found.verdict == "false" or abs(found.robustness - float(gaps.min())) < 1e-9

@@ -58,17 +58,13 @@ def _grown(parts: st.SearchStrategy[Formula]) -> st.SearchStrategy[Formula]:
         st.builds(lambda op, part: make(op, (part,)), st.sampled_from(_UNARY), parts),
         st.builds(lambda op, one, two: make(op, (one, two)), st.sampled_from(_BINARY), parts, parts),
         st.builds(
-            lambda op, one, two, bounds: make(
-                op, (one,) if op in (Op.F, Op.G) else (one, two), bounds=bounds
-            ),
+            lambda op, one, two, bounds: make(op, (one,) if op in (Op.F, Op.G) else (one, two), bounds=bounds),
             st.sampled_from(_BOUNDED),
             parts,
             parts,
             _bounds,
         ),
-        st.builds(
-            lambda join, items: join(*items), st.sampled_from((conj, disj)), st.lists(parts, max_size=4)
-        ),
+        st.builds(lambda join, items: join(*items), st.sampled_from((conj, disj)), st.lists(parts, max_size=4)),
     )
 
 
@@ -113,9 +109,7 @@ def test_rewriting_keeps_the_meaning(seed: int, past: bool, bounds: bool) -> Non
     names = ("a", "b")
     random = Random(seed)
     raw = drawn(random, 4, names, past=past, bounds=bounds)
-    formula = mapped(
-        raw, lambda part: random.choice((part, part, part, TRUE, FALSE)) if not part.args else part
-    )
+    formula = mapped(raw, lambda part: random.choice((part, part, part, TRUE, FALSE)) if not part.args else part)
     plain = nnf(formula)
     assert all(part.args[0].op is Op.PROP for part in _negations(plain))
     assert not {Op.IMPLIES, Op.IFF} & {part.op for part in subformulas(plain)}

@@ -64,9 +64,7 @@ def opposed(instance: Instance, chooses: Chooses) -> tuple[Score, list[int]]:
 
 @pytest.mark.parametrize("body", [{}, {"car": BOX}], ids=["disc", "rectangle"])
 @pytest.mark.parametrize(("chooses", "least", "most"), [(keeps_beside, 10.0, 18.0), (moves_up, 2.0, 6.0)])
-def test_who_is_passed_may_drive_on(
-    body: dict[str, object], chooses: Chooses, least: float, most: float
-) -> None:
+def test_who_is_passed_may_drive_on(body: dict[str, object], chooses: Chooses, least: float, most: float) -> None:
     score, spans = opposed(on_grid([standing(3.0, -W)], 17.0, START, **body), chooses)
     assert broken(score, "ego") == broken(score, "other") == set()
     assert least < max(spans) * PERIOD < most

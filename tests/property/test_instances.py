@@ -140,9 +140,7 @@ def test_starts_are_clear_of_obstacles(network: RoadNetwork, seed: int, data: st
 
 @quick
 @given(st.integers(6, 40), st.floats(0, 1), st.integers(0, 8), seeds)
-def test_random_networks_have_room_for_rules_and_cars(
-    intersections: int, share: float, agents: int, seed: int
-) -> None:
+def test_random_networks_have_room_for_rules_and_cars(intersections: int, share: float, agents: int, seed: int) -> None:
     least, most = intersections - 1, most_segments(intersections)
     wanted = {
         "intersections": intersections,
@@ -170,9 +168,7 @@ def test_random_networks_have_room_for_rules_and_cars(
 
 @quick
 @given(st.integers(2, 5), st.integers(2, 5), st.floats(0, 1), seeds)
-def test_grids_lose_the_share_of_segments_asked_for(
-    rows: int, columns: int, removed: float, seed: int
-) -> None:
+def test_grids_lose_the_share_of_segments_asked_for(rows: int, columns: int, removed: float, seed: int) -> None:
     grid = {"rows": rows, "columns": columns, "removed": removed, "length": 4}
     document = {"version": 1, "problem_domain": "dubins_traffic", "network": {"grid": grid}}
     whole = len(RoadNetwork.grid(rows, columns).segments)
@@ -207,9 +203,7 @@ def test_drawn_starts_reach_all_of_the_free_lanes() -> None:
 def test_goals_and_durations_follow_their_bounds(network: RoadNetwork, seed: int) -> None:
     places = len(network.intersections)
     bounds = [1, places + 3]
-    config = load_config(
-        configuration(network, e_agents=[], duration_bounds=[5, 7], number_goals_bounds=bounds)
-    )
+    config = load_config(configuration(network, e_agents=[], duration_bounds=[5, 7], number_goals_bounds=bounds))
     for trial in range(20):
         instance = draw(config, seed, trial)
         goals = instance.problem.goals
@@ -361,9 +355,7 @@ def test_instances_of_a_configuration_are_alike_but_for_roads() -> None:
 @pytest.mark.parametrize("body", [Disc(0.1), Rectangle(0.3, 0.1)])
 @quick
 @given(data=st.data())
-def test_given_starts_that_overlap_are_found_as_by_looking_at_all_pairs(
-    body: Body, data: st.DataObject
-) -> None:
+def test_given_starts_that_overlap_are_found_as_by_looking_at_all_pairs(body: Body, data: st.DataObject) -> None:
     car = Car(body=body)
     near = st.floats(-0.7, 0.7)
     angles = st.sampled_from([0.0, 0.4, 1.6, -2.5])

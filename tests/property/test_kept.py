@@ -70,9 +70,7 @@ def test_no_car_is_nearer_than_is_known(agents) -> None:
         np.fill_diagonal(far, np.inf)
         drift = cars.speed_high[0] * instance.problem.period
         lost = 2.0 * drift * (tick - own.since[0])
-        assert (
-            own.apart[0] - lost - 1e-6 <= np.minimum(far.min(axis=1), CELL if agents > 24 else np.inf)
-        ).all()
+        assert (own.apart[0] - lost - 1e-6 <= np.minimum(far.min(axis=1), CELL if agents > 24 else np.inf)).all()
         assert own.least[0] <= own.apart[0, : agents + 1].min()
         count = list_near(group.state, 0, tick, 4.0, 4.0, 3.0, own)
         near = np.hypot(group.state.x[0] - 4.0, group.state.y[0] - 4.0) <= 3.0

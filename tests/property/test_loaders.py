@@ -124,9 +124,9 @@ def spoilt(draw_: Any, document: dict[str, Any]) -> dict[str, Any]:
         if change == "remove":
             del place[path[-1]]
         elif change == "add" and isinstance(place, dict):
-            place[
-                draw_(st.sampled_from(["goals", "duration", "network", "starts", "seed", "rats", "\x1b"]))
-            ] = draw_(NASTIES)
+            place[draw_(st.sampled_from(["goals", "duration", "network", "starts", "seed", "rats", "\x1b"]))] = draw_(
+                NASTIES
+            )
         else:
             place[path[-1]] = draw_(NASTIES)
         if not places(own):
@@ -153,11 +153,7 @@ def loaded(found: object) -> None:
         document = instance_to_document(found)
         json.dumps(document, allow_nan=False).encode()
         assert found.ticks >= 1
-        if (
-            found.simulator == "embedded"
-            and found.ticks < 10**6
-            and (found.problem.laser or LASER).rays <= 1000
-        ):
+        if found.simulator == "embedded" and found.ticks < 10**6 and (found.problem.laser or LASER).rays <= 1000:
             brief = replace(found, duration=min(found.duration, 2.0 / found.problem.rate))
             run_trial(brief, "simple")
 
@@ -262,10 +258,7 @@ DEEP: dict[str, str] = {
     "lists without an end": "[" * 100_000,
     "lists in a configuration": json.dumps(CONFIG)[:-1] + ', "x": ' + "[" * 900 + "]" * 900 + "}",
     "lists in a network": json.dumps(NETWORK)[:-1] + ', "x": ' + "[" * 900 + "]" * 900 + "}",
-    "lists in the text of a network": "version: 0\nlength: 3\nshape: 2 2\nx: "
-    + "[" * 60_000
-    + "]" * 60_000
-    + "\n",
+    "lists in the text of a network": "version: 0\nlength: 3\nshape: 2 2\nx: " + "[" * 60_000 + "]" * 60_000 + "\n",
     "TOML lists": "a = " + "[" * 5000 + "]" * 5000,
     "TOML tables": "a = " + "{a = " * 5000 + "1" + "}" * 5000,
     "TOML keys": ".".join("a" * 5000) + " = 1",

@@ -74,9 +74,7 @@ def nearest(network: RoadNetwork, wanted: RoadNetwork) -> list[int]:
 @pytest.mark.parametrize("name", FOREIGN)
 @settings(max_examples=25, deadline=None, derandomize=True)
 @given(network=SEEDS.map(winding))
-def test_without_our_instructions_it_is_the_same_within_the_tolerance(
-    name: str, network: RoadNetwork
-) -> None:
+def test_without_our_instructions_it_is_the_same_within_the_tolerance(name: str, network: RoadNetwork) -> None:
     form = registry.load(name)
     assert isinstance(form, WritesMaps)
     text, count = INSTRUCTION.subn("", form.write(network.to_document()))

@@ -56,17 +56,11 @@ def test_a_rigid_motion_changes_no_answer(network: RoadNetwork, move: Any, seed:
     close = 1e-9 * (1.0 + scale)
     assert (still.lengths == moved.lengths).all()
     assert moved.to_world(still.to_lattice(points)) == pytest.approx(there, abs=close)
-    assert moved.to_lattice(there) == pytest.approx(
-        points / network.length, abs=1e-9 * (1 + max(network.shape))
-    )
+    assert moved.to_lattice(there) == pytest.approx(points / network.length, abs=1e-9 * (1 + max(network.shape)))
     assert moved.nearest_segment(there)[1] == pytest.approx(still.nearest_segment(points)[1], abs=close)
-    assert moved.nearest_intersection(there)[1] == pytest.approx(
-        still.nearest_intersection(points)[1], abs=close
-    )
+    assert moved.nearest_intersection(there)[1] == pytest.approx(still.nearest_intersection(points)[1], abs=close)
     for lane in (0, still.lanes - 1):
-        for a, b in zip(
-            moved.lane_coordinates(lane, there), still.lane_coordinates(lane, points), strict=True
-        ):
+        for a, b in zip(moved.lane_coordinates(lane, there), still.lane_coordinates(lane, points), strict=True):
             assert a == pytest.approx(b, abs=close)
     for v in range(len(still.points)):
         assert moved.arms(v) == still.arms(v)

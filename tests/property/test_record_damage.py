@@ -139,9 +139,7 @@ def test_a_chunk_that_zeros_follow_is_cut_off(data: bytes) -> None:
 
 
 def command(*arguments: str, stdin: bytes | None = None) -> tuple[int, str]:
-    ran = subprocess.run(
-        [*PROGRAM, *arguments], input=stdin, capture_output=True, timeout=600, check=False, cwd="/"
-    )
+    ran = subprocess.run([*PROGRAM, *arguments], input=stdin, capture_output=True, timeout=600, check=False, cwd="/")
     return ran.returncode, ran.stderr.decode()
 
 

@@ -74,9 +74,7 @@ def test_a_batch_equals_its_trials_alone() -> None:
         instance(network, count, car=BOX if b % 2 else None, obstacles=_obstacles(network) if b == 2 else ())
         for b, (network, count) in enumerate(zip(networks, cars, strict=True))
     ]
-    scripts = [
-        wander(network, count, 300, b) for b, (network, count) in enumerate(zip(networks, cars, strict=True))
-    ]
+    scripts = [wander(network, count, 300, b) for b, (network, count) in enumerate(zip(networks, cars, strict=True))]
     together = label(cases, scripts)
     for b, (case, script) in enumerate(zip(cases, scripts, strict=True)):
         alone = label([case], [script])

@@ -36,9 +36,7 @@ def is_satisfied(record: Record, *, clean: bool) -> bool:
     problem, frames = record.instance.problem, record.frames
     rules = RuleParameters.from_mapping(problem.rules)
     planned = round(record.instance.duration * problem.rate)
-    limit = min(
-        rules.gap_rounds * free_flow(record.instance).round_time, rules.gap_share * planned / problem.rate
-    )
+    limit = min(rules.gap_rounds * free_flow(record.instance).round_time, rules.gap_share * planned / problem.rate)
     points = problem.network.points.tolist()
     at = [
         next(
@@ -61,9 +59,7 @@ def is_satisfied(record: Record, *, clean: bool) -> bool:
 
 
 @pytest.mark.parametrize("start", ["drawn", [0.3, -0.3, 0.0]])
-@pytest.mark.parametrize(
-    "rules", [{}, {"gap_share": 0.7, "gap_rounds": 1.3}], ids=["as given", "other limits"]
-)
+@pytest.mark.parametrize("rules", [{}, {"gap_share": 0.7, "gap_rounds": 1.3}], ids=["as given", "other limits"])
 def test_satisfied_is_what_the_page_says(start: object, rules: dict[str, float], tmp_path: Path) -> None:
     own = configuration(ego={"start": start}, rules=rules)
     batch = run_batch(own, "rules", trials=12, seed=SEED)

@@ -54,9 +54,7 @@ class Phases:
             return Command(0.7 * a, math.pi * b)
         bearing = TURN + math.pi * b
         if way == "ram" and observation.others:
-            near = min(
-                observation.others, key=lambda one: math.dist((one.pose.x, one.pose.y), (pose.x, pose.y))
-            )
+            near = min(observation.others, key=lambda one: math.dist((one.pose.x, one.pose.y), (pose.x, pose.y)))
             bearing = math.atan2(near.pose.y - pose.y, near.pose.x - pose.x) + 0.5 * b
         return Command(0.7 * a, 8.0 * math.sin(bearing - pose.theta))
 
@@ -67,9 +65,7 @@ PHASES = st.lists(
     min_size=1,
     max_size=12,
 )
-PLACES = st.tuples(
-    st.floats(1.3, 4.6), st.floats(-0.4, -0.15), st.floats(-1.5, 1.5), st.sampled_from([0.0, 6.0])
-)
+PLACES = st.tuples(st.floats(1.3, 4.6), st.floats(-0.4, -0.15), st.floats(-1.5, 1.5), st.sampled_from([0.0, 6.0]))
 BLOCKS = st.sampled_from(["nothing", "parked", "disc", "beside"])
 
 

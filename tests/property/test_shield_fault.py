@@ -48,9 +48,7 @@ def pairs(body: Body, seed: int) -> list[Any]:
 
 @pytest.mark.parametrize("looks", ["the shield", "the law"])
 @pytest.mark.parametrize("body", [Rectangle(0.4, 0.25), Rectangle(0.5, 0.2), Disc(0.177)])
-def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(
-    body: Body, looks: str
-) -> None:
+def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(body: Body, looks: str) -> None:
     chance = np.random.default_rng(3)
     trials = pairs(body, 5)
     problem = trials[0].problem
@@ -62,9 +60,7 @@ def test_whatever_the_other_does_in_the_tick_the_car_is_at_fault_in_no_contact(
     )  # fmt: skip
     vehicle: Any = vehicles_of([problem])[0]
     bounds, travel = problem.car.bounds, travel_of(vehicle)
-    asked = (
-        chance.uniform(-1.0, 1.0, (PAIRS, 2)) * chance.choice([0.1, 1.0], (PAIRS, 2)) * (0.7, bounds.yaw_rate)
-    )
+    asked = chance.uniform(-1.0, 1.0, (PAIRS, 2)) * chance.choice([0.1, 1.0], (PAIRS, 2)) * (0.7, bounds.yaw_rate)
     asked[chance.random(PAIRS) < 0.3, 1] = 0.0
     let = []
     for b, (speed, yaw_rate) in enumerate(asked.tolist()):
@@ -111,9 +107,7 @@ def test_a_disc_that_turns_as_it_leads_away_is_at_fault_in_no_contact(rate: floa
     period, most, radius, travel = 1.0 / rate, vehicle.yaw_most, vehicle.reach, travel_of(vehicle)
     let = closes = 0
     for _ in range(20_000):
-        command = Command(
-            0.7 * chance.uniform() ** 4 * chance.choice([-1.0, 1.0]), most * chance.choice([-1.0, 1.0])
-        )
+        command = Command(0.7 * chance.uniform() ** 4 * chance.choice([-1.0, 1.0]), most * chance.choice([-1.0, 1.0]))
         at = period * chance.uniform(0.2, 1.0)
         x, y, c, s = advance(0.0, 0.0, 1.0, 0.0, command.speed, command.yaw_rate, at)
         ahead = 0.0 if command.speed > 0.0 else np.pi

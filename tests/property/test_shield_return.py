@@ -174,9 +174,7 @@ BODIES: list[dict[str, Any]] = [
     {"bounds": {"speed": 1.2, "yaw_rate": 2.5, "speed_min": -0.2}},
     {"body": {"rectangle": {"length": 0.35, "width": 0.2}}, "bounds": {"speed": 0.4, "turning_radius": 0.2}},
 ]
-DISCS = st.lists(
-    st.tuples(st.floats(2.4, 4.4), st.floats(-0.6, 0.6), st.floats(0.03, 0.25)), min_size=1, max_size=4
-)
+DISCS = st.lists(st.tuples(st.floats(2.4, 4.4), st.floats(-0.6, 0.6), st.floats(0.03, 0.25)), min_size=1, max_size=4)
 HUNTERS = st.lists(st.tuples(st.floats(-3.0, 9.0), st.sampled_from([-W, W])), max_size=2)
 
 

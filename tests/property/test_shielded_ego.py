@@ -50,9 +50,7 @@ def test_it_does_what_the_controller_does_under_the_shield(
     actions, infos = driven(env)
     (ended,) = [told["outcome"] for told in infos if "outcome" in told]
     asked = Scripted(env.unwrapped.commands(np.array(actions)))
-    shielded = run_trial(
-        ended.instance, Shield(asked, overtakes="never"), record=tmp_path / "a.mcap", name="env"
-    )
+    shielded = run_trial(ended.instance, Shield(asked, overtakes="never"), record=tmp_path / "a.mcap", name="env")
     assert replace(shielded.score, record=None, time_to_begin_s=None) == ended.score
     assert sum(told["interventions"] for told in infos) == shielded.score.interventions > 10
     assert {told["interventions"] for told in infos} <= set(range(skip + 1))

@@ -57,9 +57,7 @@ def hand_in(data: bytes) -> None:
 
 
 @settings(deadline=None, derandomize=True)
-@given(
-    entries, st.lists(st.sampled_from([0, 0o100644, 0o120777, 0o020644, 0o040755]), min_size=10, max_size=10)
-)
+@given(entries, st.lists(st.sampled_from([0, 0o100644, 0o120777, 0o020644, 0o040755]), min_size=10, max_size=10))
 def test_archives_of_any_names_and_kinds(files: list[tuple[str, bytes]], modes: list[int]) -> None:
     hand_in(bytes(archive(files, modes)))
 

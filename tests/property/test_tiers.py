@@ -68,9 +68,7 @@ def test_a_batch_that_goes_over_on_its_way_gives_the_same(monkeypatch, looks) ->
 
 @pytest.mark.parametrize("looks", [3, 400])
 @pytest.mark.parametrize("controller", ["lanes", "rules+shield"])
-def test_a_trial_that_goes_over_on_its_way_records_the_same(
-    monkeypatch, tmp_path: Path, controller, looks
-) -> None:
+def test_a_trial_that_goes_over_on_its_way_records_the_same(monkeypatch, tmp_path: Path, controller, looks) -> None:
     instance = draw(a_minute("town"), 2, 1)
     run_trial(instance, controller, record=tmp_path / "plain.mcap")
     switches = Switches(monkeypatch, looks)

@@ -27,11 +27,7 @@ SPIN = "i=0; while [ $i -lt 30000 ]; do i=$((i + 1)); done"
 def main(names: list[str]) -> int:
     """Print what was found, a line of JSON each; return 0 if all was as it must be."""
     trees, layers = cgroups.trees(), available_layers()
-    print(
-        json.dumps(
-            {"version": trees.version, "folders": sorted({str(own) for own in trees.folders.values()})}
-        )
-    )
+    print(json.dumps({"version": trees.version, "folders": sorted({str(own) for own in trees.folders.values()})}))
     print(json.dumps(dict(held(layers))))
     good = trees.version == 2 and {MEMORY, PROCESSES, CLOCK} <= layers.names and counts() and left() == []
     usual = suite.LIMITS

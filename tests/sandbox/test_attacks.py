@@ -35,9 +35,7 @@ as_root = pytest.mark.skipif(os.getuid() != 0, reason="only root becomes another
 def test_all_attacks_are_stopped() -> None:
     assert len(ATTACKS) >= 60
     assert len({attack.name for attack in ATTACKS}) == len(ATTACKS)
-    through = [
-        f"{found.attack.name}: {found.words}" for found in strikes(available_layers()) if not found.stopped
-    ]
+    through = [f"{found.attack.name}: {found.words}" for found in strikes(available_layers()) if not found.stopped]
     assert through == []
 
 
@@ -174,9 +172,7 @@ def test_where_no_box_can_be_made_strangers_are_refused() -> None:
 
 
 def test_layers_are_named() -> None:
-    assert Layers().without(SECCOMP).missing() == [
-        "no filter of system calls: libseccomp2 and pyseccomp are needed"
-    ]
+    assert Layers().without(SECCOMP).missing() == ["no filter of system calls: libseccomp2 and pyseccomp are needed"]
     assert {name for attack in ATTACKS for name in attack.layers} <= set(NAMES)
 
 

@@ -112,9 +112,7 @@ def test_a_built_in_controller_in_a_box_drives_as_it_does_in_process(tmp_path: P
         ("return 0.5, 1 << 2000", End.CONTROLLER_FAULT, ""),
     ],
 )
-def test_a_driving_ends_by_name_and_its_owner_is_told(
-    body: str, end: End, words: str, tmp_path: Path
-) -> None:
+def test_a_driving_ends_by_name_and_its_owner_is_told(body: str, end: End, words: str, tmp_path: Path) -> None:
     limits = Limits(decision_seconds=0.5, bank_seconds=0.5, wall_seconds=20.0, output=100_000)
     if "sleep" in body and end is End.PEER_SILENT:
         limits = replace(limits, wall_seconds=5.0)

@@ -123,9 +123,7 @@ def test_an_ordinary_user_unpacks_an_image(tmp_path: Path, drive: Path) -> None:
     assert done.stdout == "('/drive',)\n", done.stderr
 
 
-def test_a_full_disk_is_this_machine_s_fault(
-    tmp_path: Path, drive: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_is_this_machine_s_fault(tmp_path: Path, drive: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     place = submission(tmp_path, made.layer(tmp_path, files={"drive": drive.read_bytes()}), 'CMD ["/drive"]')
     with small_disk(tmp_path / "disk", 1 << 10) as disk:
         monkeypatch.setattr(platformdirs, "user_cache_dir", lambda _name: str(disk))

@@ -101,9 +101,7 @@ def test_a_box_ends_with_its_worker() -> None:
         time.sleep(0.05)
     assert marked(mark) == set()
     trees.cache_clear()
-    left = [
-        each for folder in set(trees().folders.values()) for each in folder.glob(f"{NAME}-{worker.pid}-*")
-    ]
+    left = [each for folder in set(trees().folders.values()) for each in folder.glob(f"{NAME}-{worker.pid}-*")]
     assert left == []
 
 

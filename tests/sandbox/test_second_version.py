@@ -26,9 +26,7 @@ PLACES = {
 def test_the_second_version_holds(situation: str) -> None:
     guest.require()
     user, place = PLACES[situation]
-    status, said = guest.run(
-        [sys.executable, "-m", "tests.sandbox.second_version", *ATTACKS], situation, user=user
-    )
+    status, said = guest.run([sys.executable, "-m", "tests.sandbox.second_version", *ATTACKS], situation, user=user)
     found = [json.loads(line) for line in said.splitlines() if line.startswith("{")]
     assert found, said
     assert found[0] == {"version": 2, "folders": [place]}, said

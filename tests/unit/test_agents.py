@@ -49,11 +49,7 @@ def wander(start, **more):
 
 def test_names_say_what_the_kinds_do() -> None:
     own = {"wander", "loop", "follow", "parked", "scripted"}
-    assert (
-        set(names())
-        == set(KINDS)
-        == own | {"lawful", "nemesis", "chosen", "free", "nudged", "counter", "remote"}
-    )
+    assert set(names()) == set(KINDS) == own | {"lawful", "nemesis", "chosen", "free", "nudged", "counter", "remote"}
     assert all(len(line) > 20 for line in names().values())
 
 
@@ -109,9 +105,7 @@ def test_exits_are_equally_likely_and_never_back(seed) -> None:
     def each(now):
         found[:] = now.lanes[:, 1].tolist()
 
-    run(
-        [instance([("wander", {})], [AWAY, start], trial=trial, seed=seed) for trial in range(3000)], 40, each
-    )
+    run([instance([("wander", {})], [AWAY, start], trial=trial, seed=seed) for trial in range(3000)], 40, each)
     share = {exit_: found.count(exit_) / 3000 for exit_ in set(found)}
     assert set(share) == set(GRID.successors(lane))
     assert all(abs(value - 1 / 3) < 4 * math.sqrt(2 / 9 / 3000) for value in share.values())
@@ -159,9 +153,7 @@ def test_stops_for_walls_and_rectangles() -> None:
 
 def test_keeps_a_metre_from_the_ego_but_may_turn() -> None:
     def command(theta, distance):
-        return first_commands(
-            instance([("wander", {})], [pose(1.5 + distance, -0.42), pose(1.5, -0.42, theta)])
-        )[0]
+        return first_commands(instance([("wander", {})], [pose(1.5 + distance, -0.42), pose(1.5, -0.42, theta)]))[0]
 
     assert command(0.0, 1.0 + 1e-9) == (0.5, 0.0)
     assert command(0.0, 1.0) == (0.0, 0.0)

@@ -47,9 +47,7 @@ def durations(picture: Any) -> list[float]:
 
 
 @pytest.mark.parametrize("suffix", [".gif", ".png"])
-def test_a_file_shows_what_is_painted_for_as_long_as_it_lasts(
-    record: dt.Record, tmp_path: Path, suffix: str
-) -> None:
+def test_a_file_shows_what_is_painted_for_as_long_as_it_lasts(record: dt.Record, tmp_path: Path, suffix: str) -> None:
     found = dt.animate(record, start=2.0, stop=8.0, speed=2.0, fps=8.0, size=300)
     assert len(found) == 25
     assert repr(found) == f"<Animation: 25 pictures of {found_size(found)} pixels, 8 a second>"
@@ -88,9 +86,7 @@ def test_the_first_and_the_last_second_are_shown_and_the_longer_side_is_as_asked
 
 def test_breaches_are_marked_when_they_come_and_the_pictures_before_are_as_without(record: dt.Record) -> None:
     judged = verdict(record.instance, [(3.0, "ego", "2.left")], 0)
-    bare, marked = (
-        list(dt.animate(record, start=2.0, stop=5.0, fps=2.0, verdict=one)) for one in (None, judged)
-    )
+    bare, marked = (list(dt.animate(record, start=2.0, stop=5.0, fps=2.0, verdict=one)) for one in (None, judged))
     assert [bool((one != other).any()) for one, other in zip(bare, marked, strict=True)] == [
         False, False, True, True, True, True, True,
     ]  # fmt: skip
@@ -126,9 +122,7 @@ def test_a_gif_of_a_minute_is_small_and_stores_changes_alone(record: dt.Record, 
         assert (canvas == colours.numbers(image)).all()
 
 
-def test_a_gif_takes_at_most_twice_what_pillow_takes_for_the_same_pictures(
-    record: dt.Record, tmp_path: Path
-) -> None:
+def test_a_gif_takes_at_most_twice_what_pillow_takes_for_the_same_pictures(record: dt.Record, tmp_path: Path) -> None:
     found = dt.animate(record, stop=8.0)
     images = [Pictures.fromarray(image) for image in found]
     begun = process_time()
@@ -185,9 +179,7 @@ def test_what_is_out_of_range_is_refused(record: dt.Record, name: str) -> None:
 
 
 def test_a_record_without_frames_and_too_quick_a_gif_are_refused(record: dt.Record, tmp_path: Path) -> None:
-    with pytest.raises(
-        InputError, match=r"--fps: too many pictures a second: got 60\.0; expected at most 50"
-    ):
+    with pytest.raises(InputError, match=r"--fps: too many pictures a second: got 60\.0; expected at most 50"):
         dt.animate(record, fps=60.0).write(tmp_path / "x.gif")
     assert list(tmp_path.iterdir()) == []
 

@@ -90,9 +90,7 @@ def test_the_files_that_the_notes_name_exist() -> None:
     ]
     missing: list[str] = []
     for path in pages:
-        for name in re.findall(
-            r"`((?:[a-z_0-9]+/)+[a-z_0-9]+\.py)(?:: [^`]*)?`", path.read_text(encoding="utf-8")
-        ):
+        for name in re.findall(r"`((?:[a-z_0-9]+/)+[a-z_0-9]+\.py)(?:: [^`]*)?`", path.read_text(encoding="utf-8")):
             if not any((base / name).exists() for base in (PACKAGE, ROOT, PACKAGE / "campaign")):
                 missing.append(f"{path.name}: {name}")
     assert missing == []

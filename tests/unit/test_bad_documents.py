@@ -261,9 +261,7 @@ def test_a_bad_configuration_is_refused(
     check(refused(tmp_path, document, lambda file: draw(load_config(file))), field, value, expected)
 
 
-@pytest.mark.parametrize(
-    ("document", "field", "value", "expected"), [pytest.param(*c[1:], id=c[0]) for c in INSTANCES]
-)
+@pytest.mark.parametrize(("document", "field", "value", "expected"), [pytest.param(*c[1:], id=c[0]) for c in INSTANCES])
 def test_a_bad_instance_is_refused(
     tmp_path: Path, document: Document, field: str, value: str | None, expected: str
 ) -> None:

@@ -26,9 +26,7 @@ RIGHT = 0.7 * 2.0 * W
 """So far right of the centre line these cars drive."""
 
 
-def _instance(
-    network: Any, kinds: list[dict[str, Any]], duration: float, trial: int = 0, **more: Any
-) -> Instance:
+def _instance(network: Any, kinds: list[dict[str, Any]], duration: float, trial: int = 0, **more: Any) -> Instance:
     config = load_config(
         {
             "version": 1, "problem_domain": "dubins_traffic", "rnd": network.to_document(), "duration": duration,

@@ -71,9 +71,7 @@ TIGHT = [
 
 
 @pytest.mark.parametrize(("rows", "field", "problem"), TIGHT)
-def test_roads_that_bend_too_much_are_refused_by_segment_and_corner(
-    rows: Any, field: str, problem: str
-) -> None:
+def test_roads_that_bend_too_much_are_refused_by_segment_and_corner(rows: Any, field: str, problem: str) -> None:
     faults = clearance_faults(_network(*rows), 1.0, 0.177, 0.3)
     assert faults[0].field == field
     assert problem in str(faults[0])
@@ -172,9 +170,7 @@ def test_a_car_slows_where_it_could_not_turn_with_the_road(tmp_path: Path) -> No
 
 @pytest.mark.parametrize(("road", "back"), [(4, False), (4, True), (5, False), (0, True), (2, False)])
 @pytest.mark.parametrize("what", ["disc", "parked"])
-def test_what_stands_between_bends_is_passed_by_the_rules(
-    road: int, back: bool, what: str, tmp_path: Path
-) -> None:
+def test_what_stands_between_bends_is_passed_by_the_rules(road: int, back: bool, what: str, tmp_path: Path) -> None:
     """The ego comes up behind it, is blocked and waits, passes it on the left, and is back in its lane in time."""
     track = Track(RING, road)
     start, at = 1.4, 0.45 * track.length

@@ -76,30 +76,22 @@ def kept(
 
 def test_it_says_who_is_best_and_by_how_much(tmp_path: Path, plain: Score) -> None:
     text = conclusion(kept(tmp_path, plain, COUNTED))
-    assert text.startswith(
-        "good is best: 3.25 counted rounds a trial, 2.25 more than fair, the next (95 % interval "
-    )
+    assert text.startswith("good is best: 3.25 counted rounds a trial, 2.25 more than fair, the next (95 % interval ")
     assert "told apart" not in text
 
 
 def test_it_says_who_cannot_be_told_apart(tmp_path: Path, plain: Score) -> None:
     same = {"one": [1, 2, 1, 2, 1, 2], "other": [2, 1, 2, 1, 1, 2], "none": [0] * 6, "nil": [0] * 6}
     text = conclusion(kept(tmp_path, plain, same))
-    assert text.startswith(
-        "Which is best can't be told: one has 1.5 counted rounds a trial, 0 more than other"
-    )
+    assert text.startswith("Which is best can't be told: one has 1.5 counted rounds a trial, 0 more than other")
     assert text.endswith("These can't be told apart either: none and nil.")
 
 
-def test_without_counted_rounds_it_says_so_and_uses_those_before_the_first_breach(
-    tmp_path: Path, plain: Score
-) -> None:
+def test_without_counted_rounds_it_says_so_and_uses_those_before_the_first_breach(tmp_path: Path, plain: Score) -> None:
     counted = {"good": [0] * 6, "poor": [0] * 6}
     before = {"good": [0.5, 0.5, 0.75, 0.5, 0.5, 0.5], "poor": [0.25] * 6}
     text = conclusion(kept(tmp_path, plain, counted, before))
-    assert text.startswith(
-        "No trial has a counted round. good is best: 0.5417 rounds before the first breach a trial,"
-    )
+    assert text.startswith("No trial has a counted round. good is best: 0.5417 rounds before the first breach a trial,")
 
 
 def test_of_five_pairs_nothing_is_claimed(tmp_path: Path, plain: Score) -> None:
@@ -112,9 +104,7 @@ def test_of_one_controller_it_says_what_it_has(tmp_path: Path, plain: Score) -> 
     assert text == "good has 3.5 counted rounds a trial (95 % interval 3 to 4)."
 
 
-def test_the_terminal_shows_thirty_lines_of_eighty_columns_whoever_drives(
-    tmp_path: Path, plain: Score
-) -> None:
+def test_the_terminal_shows_thirty_lines_of_eighty_columns_whoever_drives(tmp_path: Path, plain: Score) -> None:
     names = [f"path/to/some/rather/long/folder/controller_{k}.py:Controller{k}" for k in range(12)]
     comparison = kept(tmp_path, plain, {name: [0, 0, 1, 0, 1, 0, 0, 1] for name in names})
     bad = Bad({"number": 7}, "ended by a fault: " + 9 * "for a long reason ", None, "")
@@ -163,9 +153,7 @@ def test_campaigns_on_the_same_instances_are_paired(tmp_path: Path, plain: Score
     )
 
 
-def test_campaigns_of_other_seeds_are_not_paired_and_their_intervals_are_wider(
-    tmp_path: Path, plain: Score
-) -> None:
+def test_campaigns_of_other_seeds_are_not_paired_and_their_intervals_are_wider(tmp_path: Path, plain: Score) -> None:
     kept(tmp_path / "a", plain, {"mine": [1, 2, 3, 4, 5, 6]})
     kept(tmp_path / "b", plain, {"yours": [2, 3, 4, 5, 6, 7]}, seed=9)
     (found,), _ = across.compare_campaigns(tmp_path / "a", tmp_path / "b")
@@ -187,9 +175,7 @@ def test_other_configurations_of_one_name_are_other_instances(tmp_path: Path, pl
     assert found.paired == 0
 
 
-def test_the_command_compares_two_campaigns(
-    tmp_path: Path, plain: Score, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_compares_two_campaigns(tmp_path: Path, plain: Score, capsys: pytest.CaptureFixture[str]) -> None:
     kept(tmp_path / "a", plain, {"mine": [1, 2, 3, 4, 5, 6]})
     kept(tmp_path / "b", plain, {"mine": [2, 3, 4, 5, 6, 7]})
     assert main(["campaign", "compare", str(tmp_path / "a"), str(tmp_path / "b")]) == 0

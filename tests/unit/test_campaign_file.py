@@ -51,9 +51,7 @@ def test_factors_are_crossed_and_every_trial_has_one_number() -> None:
 
 def test_instances_depend_on_neither_controllers_nor_other_cells() -> None:
     few = made(factors={"e_agents": [2]})
-    many = made(
-        controllers=["rules"], configurations=["town", "demo"], factors={"e_agents": [0, 2]}, trials=3
-    )
+    many = made(controllers=["rules"], configurations=["town", "demo"], factors={"e_agents": [0, 2]}, trials=3)
     seeds = {(cell.configuration, cell.values["e_agents"]): cell.seed for cell in many.cells}
     assert few.cells[0].seed == seeds["demo", 2]
     assert len(set(seeds.values())) == 4
@@ -64,9 +62,7 @@ def test_what_is_stored_reads_back_as_the_same_campaign() -> None:
     campaign = made(factors={"e_agent_kinds": ["lawful", ["lawful", {"type": "nemesis"}]], "rules": [True]})
     again = Campaign.from_document(campaign.document)
     assert again.document == campaign.document
-    assert [cell.settled.document for cell in again.cells] == [
-        cell.settled.document for cell in campaign.cells
-    ]
+    assert [cell.settled.document for cell in again.cells] == [cell.settled.document for cell in campaign.cells]
 
 
 FACTORS: list[tuple[str, Any, str, Any]] = [
@@ -220,9 +216,7 @@ def test_chunks_get_smaller_towards_the_end_and_hold_about_as_much_work() -> Non
     for cell in campaign.cells:
         for place in campaign.places:
             counts = [
-                chunk.count
-                for chunk in chunks
-                if chunk.controller == place and chunk.configuration is cell.settled
+                chunk.count for chunk in chunks if chunk.controller == place and chunk.configuration is cell.settled
             ]
             each = cost(cell, place)
             assert max(counts) * each <= max(MOST_CAR_STEPS, each)

@@ -26,9 +26,7 @@ def test_the_grids_of_2016_have_room() -> None:
 def test_faults_name_the_place() -> None:
     short = RoadNetwork(((0, 0, 1, 0), (1, 0, 4, 0)), 2.5, STILL, (1, 5))
     assert _faults(short) == ["segments[0]: too short: got 2.5; expected at least 2.854 m"]
-    close = RoadNetwork(
-        ((0, 0, 40, 0), (40, 0, 40, 40), (40, 40, 0, 40), (0, 40, 0, 20)), 0.1, STILL, (41, 41)
-    )
+    close = RoadNetwork(((0, 0, 40, 0), (40, 0, 40, 40), (40, 40, 0, 40), (0, 40, 0, 20)), 0.1, STILL, (41, 41))
     assert _faults(close) == [
         "segments[3]: too short: got 2.0; expected at least 2.854 m",
         "segments[0]: intersections [0, 0] and [0, 20] are too close: got 2.0; expected at least 2.354 m",
@@ -72,7 +70,5 @@ def test_a_problem_with_rules_on_sharp_arms_is_refused() -> None:
         "intersection_radius": 1.0,
     }
     instance_from_document(document)
-    with pytest.raises(
-        InputError, match=r"rnd\.segments\[1\]: the rules are not defined here: too sharp an angle"
-    ):
+    with pytest.raises(InputError, match=r"rnd\.segments\[1\]: the rules are not defined here: too sharp an angle"):
         instance_from_document({**document, "rules": True})

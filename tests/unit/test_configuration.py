@@ -36,9 +36,7 @@ SQUARE = {"version": 0, "length": 5, "transform": [0, 0, 0], "shape": [2, 2]}
 def test_the_shipped_configuration_of_2016_is_the_original() -> None:
     shipped = Path(sys.modules["dubins_traffic.problem"].__path__[0]) / "configurations"
     data = (shipped / "mc-small-4grid-agents2.json").read_bytes()
-    assert (
-        hashlib.sha256(data).hexdigest() == "91d8c6db8e69f7a0c60525a83acb038305ebaa41ba4dcd38cbcb5a254a6409e0"
-    )
+    assert hashlib.sha256(data).hexdigest() == "91d8c6db8e69f7a0c60525a83acb038305ebaa41ba4dcd38cbcb5a254a6409e0"
     assert data == (GOLDEN / "mc-small-4grid-agents2.json").read_bytes()
 
 
@@ -169,9 +167,7 @@ def test_a_network_given_beside_overrides_that_of_any_configuration(tmp_path: Pa
 def test_standard_input_is_read() -> None:
     code = "from dubins_traffic.problem.configuration import load_config as f; print(f('-').number_trials)"
     text = json.dumps(bad.base(number_trials=17))
-    done = subprocess.run(
-        [sys.executable, "-c", code], input=text, capture_output=True, text=True, check=True
-    )
+    done = subprocess.run([sys.executable, "-c", code], input=text, capture_output=True, text=True, check=True)
     assert done.stdout == "17\n"
 
 
@@ -251,9 +247,7 @@ def test_trial_data_is_json_with_the_keys_of_2016(tmp_path: Path) -> None:
     assert TrialData.read(tmp_path / "data.json") == data
 
 
-@pytest.mark.parametrize(
-    "named", [{"rnd": "square.net.xml"}, {"rnd": ..., "network": {"file": "square.net.xml"}}]
-)
+@pytest.mark.parametrize("named", [{"rnd": "square.net.xml"}, {"rnd": ..., "network": {"file": "square.net.xml"}}])
 def test_a_network_that_was_named_by_path_is_written_in(named: dict[str, Any], tmp_path: Path) -> None:
     """In trial data, what a campaign or a competition keeps, and a search."""
     RoadNetwork.from_document(SQUARE).write(tmp_path / "square.net.xml")
@@ -279,9 +273,7 @@ def test_shipped_schemas_are_valid_and_up_to_date() -> None:
 
 
 def test_valid_documents_agree_with_the_schemas() -> None:
-    documents: list[tuple[str, Any]] = [
-        ("configuration", load_config(name).to_document()) for name in shipped_names()
-    ]
+    documents: list[tuple[str, Any]] = [("configuration", load_config(name).to_document()) for name in shipped_names()]
     instances = [draw(load_config(name), 1) for name in shipped_names()]
     documents += [("instance", instance_to_document(i, version)) for i in instances for version in (0, 1)]
     documents += [("network", i.problem.network.to_document()) for i in instances]

@@ -114,9 +114,7 @@ def batch(configuration: dt.Configuration) -> dt.Batch:
 
 
 @pytest.fixture(scope="module")
-def values(
-    configuration: dt.Configuration, result: dt.Result, record: dt.Record, batch: dt.Batch
-) -> dict[str, Any]:
+def values(configuration: dt.Configuration, result: dt.Result, record: dt.Record, batch: dt.Batch) -> dict[str, Any]:
     own = result.instance
     found = [
         own.problem.network, own.problem, own, record, record.frames, result, result.score, result.score.verdict,
@@ -140,9 +138,7 @@ def test_every_value_is_told_in_a_line(values: dict[str, Any]) -> None:
     assert len(repr([*values.values()])) < 2000
 
 
-@pytest.mark.parametrize(
-    "name", ["RoadNetwork", "Problem", "Instance", "Record", "Result", "Batch", "ScoreSheet"]
-)
+@pytest.mark.parametrize("name", ["RoadNetwork", "Problem", "Instance", "Record", "Result", "Batch", "ScoreSheet"])
 def test_notebooks_get_a_picture(values: dict[str, Any], name: str) -> None:
     text = values[name]._repr_html_()
     found = read(text)

@@ -71,9 +71,7 @@ def test_terms_and_costs_are_what_the_score_counts() -> None:
         assert reward == pytest.approx(own.sum(axis=0))
         terms += own
         counted = np.array([info["costs"][name] for name in COSTS])
-        assert (
-            info["cost"].tolist() == counted[[name != "1.collision" for name in COSTS]].sum(axis=0).tolist()
-        )
+        assert info["cost"].tolist() == counted[[name != "1.collision" for name in COSTS]].sum(axis=0).tolist()
         costs += counted
         step += 1
     assert over.all()

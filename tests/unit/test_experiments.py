@@ -32,9 +32,7 @@ def test_all_that_is_stored_is_of_a_claim_and_dated() -> None:
         assert found.rows
 
 
-def test_a_result_is_stored_with_date_commit_and_machine(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_result_is_stored_with_date_commit_and_machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(stored, "FOLDER", tmp_path)
     monkeypatch.setattr(stored, "_commit", lambda: "0123abc")
     rows = [Row("trials", "2", "0", False), Row("metres", "3.5", "", True)]

@@ -106,9 +106,7 @@ def test_a_case_is_read_as_it_was_written(tmp_path: Path) -> None:
 def test_a_genome_comes_back_from_json_and_builds_the_same_instance() -> None:
     source = Source(prepared(JUNCTION, 15.0, {}), 3)
     genome = source.fresh(5)
-    children = [
-        source.varied(genome, source.fresh(7), source.dice(number, Stream.CHANGES)) for number in range(40)
-    ]
+    children = [source.varied(genome, source.fresh(7), source.dice(number, Stream.CHANGES)) for number in range(40)]
     for own in (genome, *children, source.arranged(8, source.dice(8, Stream.CHANGES))):
         again = Genome.from_json(own.to_json())
         assert source.build([again]) == source.build([own])
@@ -139,9 +137,7 @@ def test_a_folder_holds_one_search(tmp_path: Path) -> None:
         pass
 
 
-@pytest.mark.parametrize(
-    "text", ["", "{", "[1]", '{"settings": {"seed": 1}}', '{"sha256": "%s", "state": {"a": 2}}']
-)
+@pytest.mark.parametrize("text", ["", "{", "[1]", '{"settings": {"seed": 1}}', '{"sha256": "%s", "state": {"a": 2}}'])
 def test_a_state_that_is_not_as_it_was_written_is_refused(tmp_path: Path, text: str) -> None:
     with opened(tmp_path / "a", {"seed": 1}, resume=False) as archive:
         archive.remember({"settings": {"seed": 1}, "a": 1})
@@ -227,8 +223,6 @@ def test_a_trial_that_is_drawn_in_an_evolution_chooses_as_much_as_any_that_is_dr
     proposed = zip(range(32, 632), evolution.propose(range(32, 632)), strict=True)
     drawn = [own for number, own in proposed if own.base == own.root == number]
     chosen = [np.mean([np.isfinite(table).mean() for table in own.tables.values()]) for own in drawn]
-    usual = [
-        np.mean([np.isfinite(table).mean() for table in source.fresh(n).tables.values()]) for n in range(400)
-    ]
+    usual = [np.mean([np.isfinite(table).mean() for table in source.fresh(n).tables.values()]) for n in range(400)]
     assert len(drawn) > 150
     assert abs(np.mean(chosen) - np.mean(usual)) < 0.03

@@ -113,9 +113,7 @@ def test_every_fit_keeps_the_limits(steps: list[tuple[float, float]], heading: f
     if found is not None:
         assert keeps(line, found, LIMITS)
         pieces = chain(points[0], found.corners, points[-1])
-        assert sum(piece.length for piece in pieces) == pytest.approx(
-            true_length(line[[0, -1]], found.corners)
-        )
+        assert sum(piece.length for piece in pieces) == pytest.approx(true_length(line[[0, -1]], found.corners))
 
 
 def test_arms_are_turned_as_little_as_needed() -> None:

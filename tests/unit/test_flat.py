@@ -64,9 +64,7 @@ def test_clocks_count_how_long_a_car_stands_waits_and_is_first() -> None:
     seconds = in_a_row(waits) / rate
     assert own.column("clocks.waiting") == pytest.approx(seconds / (seconds + LONG), abs=1e-6)
     turn = in_a_row(first) / rate
-    assert own.column("clocks.forfeit") == pytest.approx(
-        np.where(turn > 0.0, 1.0 - turn / 3.0, 0.0), abs=1e-6
-    )
+    assert own.column("clocks.forfeit") == pytest.approx(np.where(turn > 0.0, 1.0 - turn / 3.0, 0.0), abs=1e-6)
     still = in_a_row(np.array([abs(observation.twist.speed) < 0.05 for observation, _ in own.seen])) / rate
     assert own.column("clocks.standing") == pytest.approx(still / (still + LONG), abs=1e-6)
     assert waits.any()
@@ -112,6 +110,4 @@ def test_the_nearest_obstacles_are_shown_in_the_cars_frame() -> None:
     sight = problem.sensing_radius
     for k, (ahead, left) in enumerate(nearest):
         found = [shown[f"obstacles[{k}].{name}"] for name in ("seen", "x", "y", "reach")]
-        assert found == pytest.approx(
-            [1.0, ahead / sight, left / sight, 0.05 / problem.car.lane_width], abs=1e-6
-        )
+        assert found == pytest.approx([1.0, ahead / sight, left / sight, 0.05 / problem.car.lane_width], abs=1e-6)

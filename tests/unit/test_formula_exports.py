@@ -35,9 +35,7 @@ from tests.formulas import drawn
 from tests.grammars import TLSF, slugs_sections, tlsf_sections
 
 TASK = Specification(
-    assumptions=tuple(
-        map(parse, ("[]<> free_0", "[] (stands -> <>[0,5] !stands)", "[] (ahead -> <> !ahead)"))
-    ),
+    assumptions=tuple(map(parse, ("[]<> free_0", "[] (stands -> <>[0,5] !stands)", "[] (ahead -> <> !ahead)"))),
     guarantees=tuple(
         map(
             parse,
@@ -59,9 +57,7 @@ PERIOD = 0.1
 
 
 def test_spin_without_past_and_bounds() -> None:
-    plain = Specification(
-        (parse("[]<> f"),), (parse("[] (e -> (a W b))"), parse("a M b")), ("f",), ("e", "a", "b")
-    )
+    plain = Specification((parse("[]<> f"),), (parse("[] (e -> (a W b))"), parse("a M b")), ("f",), ("e", "a", "b"))
     assert spin(plain, PERIOD) == "[] <> f -> ([] (e -> b V (a || b)) && b U (a && b))"
 
 
@@ -80,9 +76,7 @@ def test_spot_counts_ticks() -> None:
 
 
 def test_stl_has_signals_and_seconds() -> None:
-    task = Specification(
-        (parse("[]<> f"),), (parse("[] (l -> <>[0,10] !l)"), parse("a T b")), ("f",), ("l", "a", "b")
-    )
+    task = Specification((parse("[]<> f"),), (parse("[] (l -> <>[0,10] !l)"), parse("a T b")), ("f",), ("l", "a", "b"))
     assert stl(task, 1 / 30) == (
         "(always (eventually (f > 0))) -> ((always ((l > 0) -> (eventually[0:10] (not (l > 0))))) and "
         "(not ((not (a > 0)) since (not (b > 0)))))"
@@ -163,16 +157,13 @@ def test_sides_must_be_clear() -> None:
         Specification((), (), ("a",), ("a",))
 
 
-@pytest.mark.parametrize(
-    "style", [SPIN, ASCII, Style({}, Brackets.ALL)], ids=["spin", "ascii", "all brackets"]
-)
+@pytest.mark.parametrize("style", [SPIN, ASCII, Style({}, Brackets.ALL)], ids=["spin", "ascii", "all brackets"])
 def test_what_is_written_together_is_what_the_whole_formula_is(style: Style) -> None:
     random = Random(4)
 
     def side() -> tuple[Formula, ...]:
         return tuple(
-            drawn(random, random.randint(0, 3), ("a", "b"), past=True, bounds=True)
-            for _ in range(random.randint(0, 3))
+            drawn(random, random.randint(0, 3), ("a", "b"), past=True, bounds=True) for _ in range(random.randint(0, 3))
         )
 
     for _ in range(200):

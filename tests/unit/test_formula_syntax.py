@@ -163,9 +163,7 @@ def test_errors_keep_their_place_when_they_are_placed_in_a_document() -> None:
     placed = caught.value.within(file="x.json", field="formulas.mine")
     assert isinstance(placed, FormulaError)
     assert (placed.line, placed.column) == (1, 5)
-    assert str(placed).startswith(
-        "x.json: formulas.mine: line 1, column 5: ends too early; expected a proposition"
-    )
+    assert str(placed).startswith("x.json: formulas.mine: line 1, column 5: ends too early; expected a proposition")
 
 
 @pytest.mark.parametrize(

@@ -33,9 +33,7 @@ def test_bearings_vary() -> None:
 
 
 def test_a_request_that_cannot_be_placed_names_the_largest_that_was() -> None:
-    with pytest.raises(
-        InputError, match=r"at angles of at least 114\.592 degrees: got 70; expected at most \d+"
-    ):
+    with pytest.raises(InputError, match=r"at angles of at least 114\.592 degrees: got 70; expected at most \d+"):
         generate(60, 70, 0, minimum_angle=2.0)
     assert len(generate(60, 59, 0, minimum_angle=2.0).segments) == 59
 

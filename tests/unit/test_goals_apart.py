@@ -52,9 +52,7 @@ def test_each_intersection_is_first_and_second_as_often_as_another() -> None:
 
 
 def test_without_the_option_goals_are_drawn_as_ever() -> None:
-    document = {
-        key: value for key, value in load_config("town").to_document().items() if key != "goal_segments_apart"
-    }
+    document = {key: value for key, value in load_config("town").to_document().items() if key != "goal_segments_apart"}
     bare, said = load_config(document), load_config({**document, "goal_segments_apart": 1})
     for trial in range(6):
         draws = Draws(3, trial, Stream.GOALS)
@@ -87,9 +85,7 @@ def test_other_values_are_refused(value: object) -> None:
 
 def test_an_impossible_one_is_refused_by_name() -> None:
     document = {**load_config("junction").to_document(), "goal_segments_apart": 3}
-    with pytest.raises(
-        InputError, match=r"goal_segments_apart.*2 goals so far apart are not found.*fewer goals"
-    ):
+    with pytest.raises(InputError, match=r"goal_segments_apart.*2 goals so far apart are not found.*fewer goals"):
         draw(load_config(document))
 
 

@@ -58,16 +58,12 @@ def test_the_ego_starts_on_its_round() -> None:
         network, start = instance.problem.network, instance.starts[0]
         limit, speed = 0.5 * 60, instance.problem.car.bounds.speed
         point = np.array([[start.x, start.y]])
-        off = [
-            float(to_segments(point, np.array(network.lane_line(k, -0.3)))[0]) for k in range(network.lanes)
-        ]
+        off = [float(to_segments(point, np.array(network.lane_line(k, -0.3)))[0]) for k in range(network.lanes)]
         assert min(off) < 1e-6
         lane = int(np.argmin(off))
         with_end = {*instance.problem.goal_vertices, *network.lane_ends(lane)}
         assert round_time(network, sorted(with_end), speed) <= limit
-    elsewhere = load_config(
-        {**own.to_document(), "ego": {"start": [1.0, -0.3, 0.0]}, "rnd": ROAD.to_document()}
-    )
+    elsewhere = load_config({**own.to_document(), "ego": {"start": [1.0, -0.3, 0.0]}, "rnd": ROAD.to_document()})
     assert draw(elsewhere, 1, 0).starts[0].x == 1.0
 
 
@@ -95,8 +91,7 @@ def test_where_the_number_drawn_is_too_large_there_are_fewer_down_to_the_lower_b
         draws = Draws(seed, 0, Stream.GOALS)
         assert len(draw_goals(ROAD, (1, 3), draws, 1, Reach(0.5, 17.9)).vertices) == 1
     numbers = [
-        len(draw_goals(ROAD, (1, 3), Draws(seed, 0, Stream.GOALS), 1, Reach(0.5, 18.0)).vertices)
-        for seed in range(40)
+        len(draw_goals(ROAD, (1, 3), Draws(seed, 0, Stream.GOALS), 1, Reach(0.5, 18.0)).vertices) for seed in range(40)
     ]
     assert set(numbers) == {1, 2, 3}
     with pytest.raises(

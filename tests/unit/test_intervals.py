@@ -11,9 +11,7 @@ from dubins_traffic.errors import MissingExtraError
 from dubins_traffic.falsification.estimate import estimate
 
 
-@pytest.mark.parametrize(
-    ("count", "total"), [(0, 10), (1, 10), (10, 10), (7, 1000), (0, 1_000_000), (999, 1000)]
-)
+@pytest.mark.parametrize(("count", "total"), [(0, 10), (1, 10), (10, 10), (7, 1000), (0, 1_000_000), (999, 1000)])
 def test_the_intervals_of_a_share_are_those_of_the_binomial_distribution(count: int, total: int) -> None:
     found = stats.binomtest(count, total)
     exact, score = (found.proportion_ci(0.95, method) for method in ("exact", "wilson"))

@@ -73,9 +73,7 @@ def test_who_touches_another_in_breach_is_found_guilty_from_the_poses(roads: Roa
     script = hold(right, left, frames=4)
     found = said(judged(case(roads, 2), script, [touch(2, 0, 1, (0.3, 0.3), (True, True))]))
     assert ("E2", 1, 2, 2) in found
-    found = said(
-        judged(case(roads, 2), hold(left, right, frames=4), [touch(2, 0, 1, (0.3, 0.3), (True, True))])
-    )
+    found = said(judged(case(roads, 2), hold(left, right, frames=4), [touch(2, 0, 1, (0.3, 0.3), (True, True))]))
     assert [entry for entry in found if entry[0] == "E2"] == [("E2", 1, 2, 2)]
 
 
@@ -185,9 +183,7 @@ def test_who_backs_out_of_overtaking_turns_only_behind_where_that_began(
 @both
 @anybody
 @pytest.mark.parametrize(("beyond", "broken"), [(EASED, False), (EPS, True)])
-def test_limits_are_eased_for_who_would_be_in_breach(
-    roads: RoadNetwork, who: int, beyond: float, broken: bool
-) -> None:
+def test_limits_are_eased_for_who_would_be_in_breach(roads: RoadNetwork, who: int, beyond: float, broken: bool) -> None:
     """By less than a thousandth of a thousandth of a millimetre: of the road, of the lane, and of the place to stop."""
     lane = lanes_in(roads)[0]
     edge = pair(roads, who, [on_lane(roads, lane, 2.0, offset) for offset in (-0.5, -0.6 - beyond)])
@@ -248,9 +244,7 @@ def test_who_enters_is_first_in_order(roads: RoadNetwork, who: int, late: int, r
 @both
 @anybody
 @pytest.mark.parametrize(("gap", "rules"), [(EPS, []), (-EPS, ["3.clear"])])
-def test_who_enters_finds_the_crossing_clear(
-    roads: RoadNetwork, who: int, gap: float, rules: list[str]
-) -> None:
+def test_who_enters_finds_the_crossing_clear(roads: RoadNetwork, who: int, gap: float, rules: list[str]) -> None:
     """What counts is the frame before the entry."""
     mine, out = entering(roads, 8), lanes_out(roads)[1]
     inside, leaving, gone = after(roads, out, -0.4), after(roads, out, gap), after(roads, out, 0.5)
@@ -293,9 +287,7 @@ def test_what_is_not_asked_for_is_not_judged() -> None:
     silent = type(instance.problem)(
         **{name: getattr(instance.problem, name) for name in instance.problem.__slots__} | {"rules": {}}
     )
-    bare = type(instance)(
-        **{name: getattr(instance, name) for name in instance.__slots__} | {"problem": silent}
-    )
+    bare = type(instance)(**{name: getattr(instance, name) for name in instance.__slots__} | {"problem": silent})
     assert judged(bare, script, [touch(1, 0, 1, (0.1, 0.1), (True, True))]) == []
 
 

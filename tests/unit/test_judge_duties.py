@@ -118,9 +118,7 @@ def test_e4_no_exit_is_free_with_somebody_near_in_each(roads: RoadNetwork) -> No
         others[1] = after(roads, lanes_out(roads)[1], gap - RHO, lateral)
         script = hold(others[0], inside, *others[1:], frames=31)
         return [
-            entry
-            for entry in said(judged(case(roads, len(others) + 1, exit_time=3.0), script))
-            if entry[0] != "2.left"
+            entry for entry in said(judged(case(roads, len(others) + 1, exit_time=3.0), script)) if entry[0] != "2.left"
         ]
 
     late = [("E4", 1, 30, 0)]
@@ -142,9 +140,7 @@ def test_e4_who_is_out_on_a_lane_that_an_obstacle_narrows_has_the_other_exits(ro
         problem = replace(trial.problem, obstacles=(DiscObstacle(x, y, 0.1),))
         own, taken = on_lane(roads, out[0], 1.1, -0.3), [after(roads, lane, gap) for lane in out[1:]]
         script = hold(away(roads), own, *taken, frames=31)
-        return [
-            entry for entry in said(judged(replace(trial, problem=problem), script)) if entry[:2] == ("E4", 1)
-        ]
+        return [entry for entry in said(judged(replace(trial, problem=problem), script)) if entry[:2] == ("E4", 1)]
 
     late = [("E4", 1, 30, 0)]
     assert (found(1.2, -0.3), found(0.4, -0.3)) == (late, [])
@@ -308,9 +304,7 @@ def test_e4_in_a_dead_end_who_is_nearer_to_the_way_out_leaves_first() -> None:
     out = STAR.arms(STAR.vertex((0, 1)))[0]
     deep, near = on_lane(STAR, out, 0.1, -0.3), on_lane(STAR, out, 0.6, -0.3)
     far = on_lane(STAR, lanes_star(), 2.0, -0.3)
-    assert said(judged(case(STAR, 3, rest_time=600.0), hold(far, deep, near, frames=51))) == [
-        ("E4", 2, 50, 0)
-    ]
+    assert said(judged(case(STAR, 3, rest_time=600.0), hold(far, deep, near, frames=51))) == [("E4", 2, 50, 0)]
     assert said(judged(case(STAR, 2), hold(near, deep, frames=51))) == []
 
 
@@ -355,11 +349,7 @@ def test_e5_who_goes_to_and_fro_over_the_edge_of_a_disc_begins_no_journey(roads:
     assert said(judged(case(roads, 2, **rules), pair(roads, 1, places))) == [("E5", 1, 30, 0)]
     elsewhere = [*places[:25], after(roads, one ^ 1, -0.1), *places[:25]]
     assert roads.lane_ends(one ^ 1)[0] != v
-    found = [
-        entry
-        for entry in said(judged(case(roads, 2, **rules), pair(roads, 1, elsewhere)))
-        if entry[0] == "E5"
-    ]
+    found = [entry for entry in said(judged(case(roads, 2, **rules), pair(roads, 1, elsewhere))) if entry[0] == "E5"]
     assert found == []
 
 
@@ -659,6 +649,4 @@ def test_e6_names_who_has_been_there_longest_of_those_who_relieve_each_other() -
     assert said(found) == [("E6", 2, 30, 0)]
     assert found[0].vertex == STAR.vertex(goal)
     gap = [[ego, inside if k != 20 else outside, outside] for k in range(45)]
-    assert [
-        entry for entry in said(judged(case(STAR, 3, [goal], goal_time=3.0), gap)) if entry[0] == "E6"
-    ] == []
+    assert [entry for entry in said(judged(case(STAR, 3, [goal], goal_time=3.0), gap)) if entry[0] == "E6"] == []

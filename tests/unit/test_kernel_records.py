@@ -85,9 +85,7 @@ def spread_out(pairs: Rows[Pair], b: int) -> None:
         far[k] = 2.0 * near[k]
 
 
-@pytest.mark.parametrize(
-    "call", [spread_out, getattr(spread_out, "py_func", spread_out)], ids=["as it is", "plain"]
-)
+@pytest.mark.parametrize("call", [spread_out, getattr(spread_out, "py_func", spread_out)], ids=["as it is", "plain"])
 def test_blocks_have_columns_with_names(call) -> None:
     pairs = table(Pair, 2)
     pairs[1].near[2] = 1.5

@@ -30,9 +30,7 @@ from dubins_traffic.simulators.embedded import Embedded
 W, R = 0.3, 1.0
 TURN = 0.4
 LONG = {"version": 0, "length": 6.0, "shape": [3, 3], "transform": [0.0, 0.0, TURN]}
-STAR = RoadNetwork(
-    ((0, 0, 3, 0), (0, 0, -2, 3), (0, 0, -3, -3), (0, 0, 2, -3)), 1.0, (0.5, -1.0, 0.3), (7, 7)
-)
+STAR = RoadNetwork(((0, 0, 3, 0), (0, 0, -2, 3), (0, 0, -3, -3), (0, 0, 2, -3)), 1.0, (0.5, -1.0, 0.3), (7, 7))
 
 
 def turned(x: float, y: float, theta: float = 0.0) -> list[float]:

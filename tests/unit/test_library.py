@@ -46,9 +46,7 @@ print(linking.link({key: store.kernel_file(key, loading.target())}, level(), Pat
 
 def python(cache: Path, code: str, *words: str, **variables: str) -> tuple[str, str]:
     around = {**os.environ, "NUMBA_CACHE_DIR": str(cache), "DUBINS_TRAFFIC_KERNELS": "auto", **variables}
-    ran = subprocess.run(
-        [sys.executable, "-c", code, *words], env=around, check=True, capture_output=True, text=True
-    )
+    ran = subprocess.run([sys.executable, "-c", code, *words], env=around, check=True, capture_output=True, text=True)
     return ran.stdout, ran.stderr
 
 
@@ -166,9 +164,7 @@ def test_a_lower_level_that_the_environment_names_is_taken(monkeypatch) -> None:
 def test_levels_are_those_of_the_processor(tmp_path, monkeypatch, lacking, best) -> None:
     """It has a level if it can do all that the level adds, and those below."""
     features = [
-        name
-        for level, own in levels.FEATURES.items()
-        for name in own.split()[: -1 if level == lacking else None]
+        name for level, own in levels.FEATURES.items() for name in own.split()[: -1 if level == lacking else None]
     ]
     (tmp_path / "told").write_text(f"processor : 0\nflags\t\t: fpu {' '.join(features)}\nbugs :\n")
     monkeypatch.setattr(levels, "TOLD", tmp_path / "told")

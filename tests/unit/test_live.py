@@ -109,9 +109,7 @@ def test_two_hosts_or_none_and_wrong_secrets_are_refused() -> None:
     assert refused(access, "/", ("Host", HOST)) == 403
     assert refused(access, "/?token=x", ("Host", HOST), cookie_of(access)) == 403
     assert refused(access, f"/?token={access.token}&token=x", ("Host", HOST)) == 403
-    assert (
-        refused(access, f"/socket?token={access.token}", ("Host", HOST), ("Origin", f"http://{HOST}")) == 403
-    )
+    assert refused(access, f"/socket?token={access.token}", ("Host", HOST), ("Origin", f"http://{HOST}")) == 403
     name = cookie_of(access)[1].partition("=")[0]
     assert refused(access, "/", ("Host", HOST), ("Cookie", f"{name}=x")) == 403
 

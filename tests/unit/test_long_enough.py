@@ -45,9 +45,7 @@ def test_the_notice_is_one_line_and_only_where_a_trial_is_too_short() -> None:
 
 
 @pytest.mark.parametrize("command", ["run", "batch", "campaign"])
-def test_commands_say_it_before_trials_run(
-    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_commands_say_it_before_trials_run(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     own = tmp_path / "own.json"
     own.write_text(json.dumps(document(2.0)))
     arguments = [command, str(own), "--controller", "rules", "--trials", "2"]

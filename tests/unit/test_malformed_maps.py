@@ -152,9 +152,7 @@ CASES = general() + [
 ]
 
 
-@pytest.mark.parametrize(
-    ("name", "what", "make", "words"), CASES, ids=[f"{case[0]}-{case[1]}" for case in CASES]
-)
+@pytest.mark.parametrize(("name", "what", "make", "words"), CASES, ids=[f"{case[0]}-{case[1]}" for case in CASES])
 def test_a_broken_map_is_refused_with_its_file(name: str, what: str, make: Make, words: str) -> None:
     with pytest.raises(InputError, match=words) as caught:
         RoadNetwork.from_text(make(), "broken.map", registry.load(name))

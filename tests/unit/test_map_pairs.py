@@ -17,9 +17,7 @@ from dubins_traffic.maps.settings import ImportSettings
 from dubins_traffic.roads.network import RoadNetwork
 
 
-def road(
-    made: dict[str, Junction], first: str, last: str, lanes: tuple[int, int] = (1, 0), width: float = 3.2
-) -> Road:
+def road(made: dict[str, Junction], first: str, last: str, lanes: tuple[int, int] = (1, 0), width: float = 3.2) -> Road:
     line = np.array([made[first][:2], made[last][:2]])
     return Road(f"{first}{last}", first, last, line, *lanes, width)
 
@@ -153,17 +151,14 @@ def town(tmp_path: Path) -> Path:
                     f'<lane id="{name}_0" index="0" length="9" speed="9"/></edge>'
                 )
     junctions = [
-        f'<junction id="{name}" type="priority" x="{one.x}" y="{one.y}"/>'
-        for name, one in whole.junctions.items()
+        f'<junction id="{name}" type="priority" x="{one.x}" y="{one.y}"/>' for name, one in whole.junctions.items()
     ]
     file = tmp_path / "town.net.xml"
     file.write_text(NET.format(edges="\n".join(edges), junctions="\n".join(junctions)))
     return file
 
 
-def test_the_command_line_makes_pairs_one_road(
-    town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_command_line_makes_pairs_one_road(town: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     output = tmp_path / "town.json"
     assert main(["network", "--from", str(town), "--pairs", "20", "-o", str(output)]) == 0
     assert "altered      3     600  two one-way roads beside each other" in capsys.readouterr().err

@@ -85,15 +85,11 @@ def test_a_part_is_a_network(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     assert main(["network", "--from", VILLAGE, "-o", str(whole)]) == 0
     assert main(["network", "--from", VILLAGE, "--clip=-200,-200,400,400", "-o", str(part)]) == 0
     assert whole.read_bytes() == part.read_bytes()
-    assert (
-        main(["network", "--from", VILLAGE, "--around", "market", "215", "-o", str(part), "--overwrite"]) == 0
-    )
+    assert main(["network", "--from", VILLAGE, "--around", "market", "215", "-o", str(part), "--overwrite"]) == 0
     assert "5 segments of 7 roads" in capsys.readouterr().err
 
 
-def test_what_was_lost_is_told_where_no_loop_is_left(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_what_was_lost_is_told_where_no_loop_is_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     told = tmp_path / "lost.json"
     part = ("--around", "market", "160", "--losses", str(told))
     assert main(["network", "--from", VILLAGE, *part, "-o", str(tmp_path / "part.json")]) == 2

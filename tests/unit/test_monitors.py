@@ -89,14 +89,8 @@ def test_what_is_too_large_to_be_put_together_is_said_to_be_late() -> None:
 
 @pytest.mark.parametrize(("rate", "ticks"), [(30.0, 300), (10.0, 100), (7.0, 70)])
 def test_the_ten_seconds_of_rule_2_end_at_the_right_tick(rate: float, ticks: int) -> None:
-    assert (
-        history("[] (l -> <>[0,10] !l)", "l", [""] + ["l"] * ticks + [""], 1 / rate)
-        == "t" + "f" * ticks + "t"
-    )
-    assert (
-        history("[] (l -> <>[0,10] !l)", "l", [""] + ["l"] * (ticks + 2), 1 / rate)
-        == "t" + "f" * ticks + "FF"
-    )
+    assert history("[] (l -> <>[0,10] !l)", "l", [""] + ["l"] * ticks + [""], 1 / rate) == "t" + "f" * ticks + "t"
+    assert history("[] (l -> <>[0,10] !l)", "l", [""] + ["l"] * (ticks + 2), 1 / rate) == "t" + "f" * ticks + "FF"
 
 
 def test_a_clock_follows_the_oldest_request_and_starts_anew() -> None:

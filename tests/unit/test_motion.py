@@ -143,9 +143,7 @@ def test_pairs_beyond_the_buffer_are_not_lost() -> None:
     assert [(c.car, c.other) for c in contacts] == [(0, 1)]
 
 
-@pytest.mark.parametrize(
-    "lay_out", [np.asfortranarray, np.float32, lambda commands: commands[:, ::-1][:, ::-1]]
-)
+@pytest.mark.parametrize("lay_out", [np.asfortranarray, np.float32, lambda commands: commands[:, ::-1][:, ::-1]])
 def test_commands_of_any_layout_do_the_same(lay_out) -> None:
     instance = scene([pose(0.0, 0.0, 0.0), pose(2.0, 1.0, 0.5)])
     plain, other = Embedded(), Embedded()

@@ -149,7 +149,5 @@ def test_a_leader_is_ahead_in_the_lane(trial: Asks) -> None:
 
 
 def test_a_box_loads_no_pydantic_for_it() -> None:
-    code = (
-        "import sys, dubins_traffic as dt; dt.Navigator, dt.Situation; assert 'pydantic' not in sys.modules"
-    )
+    code = "import sys, dubins_traffic as dt; dt.Navigator, dt.Situation; assert 'pydantic' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True)

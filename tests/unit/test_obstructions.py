@@ -19,9 +19,7 @@ def disc(x: float, y: float, radius: float) -> dict[str, Any]:
     return {"disc": {"x": x, "y": y, "radius": radius}}
 
 
-def drawn(
-    rows: int, columns: int, goals: list[list[int]], *obstacles: dict[str, Any], **more: Any
-) -> Instance:
+def drawn(rows: int, columns: int, goals: list[list[int]], *obstacles: dict[str, Any], **more: Any) -> Instance:
     document = {
         "version": 1,
         "problem_domain": "dubins_traffic",

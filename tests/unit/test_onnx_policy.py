@@ -22,9 +22,7 @@ POLICIES = ROOT / "examples" / "learning"
 
 def random_policy(rng: np.random.Generator, rows: int, choices: np.ndarray) -> Policy:
     widths = (5, 7, 6, rows)
-    layers = tuple(
-        (rng.normal(size=(after, before)), rng.normal(size=after)) for before, after in pairwise(widths)
-    )
+    layers = tuple((rng.normal(size=(after, before)), rng.normal(size=after)) for before, after in pairwise(widths))
     names = ("own.speed", "lane.offset", "lane.heading_sin", "goal.bearing_sin", "crossing.x")
     return Policy(names, 3, 2, layers, choices)
 
@@ -57,9 +55,7 @@ def test_it_may_name_nothing_and_return_the_number_of_an_action(tmp_path: Path) 
     ]
     weights = np.zeros((4, 15))
     weights[2, 7] = 1.0
-    policy = OnnxPolicy(
-        written(tmp_path / "policy.onnx", nodes, {"w": weights}, width=4, returns=TensorProto.INT64)
-    )
+    policy = OnnxPolicy(written(tmp_path / "policy.onnx", nodes, {"w": weights}, width=4, returns=TensorProto.INT64))
     assert (policy.names, policy.cars, policy.frame_skip) == ((), 5, 1)
     assert policy.act(np.array([0.0, 0.0, 1.0, 0.0])).tolist() == CHOICES[7].tolist()
     assert policy.act(np.array([0.0, 0.0, -1.0, 0.0])).tolist() == CHOICES[0].tolist()
@@ -74,9 +70,7 @@ def test_what_is_larger_than_a_share_is_clipped(tmp_path: Path) -> None:
 def test_a_model_that_draws_random_numbers_draws_the_same_again(tmp_path: Path) -> None:
     node = helper.make_node("RandomUniformLike", ["seen"], ["action"], high=1.0, low=-1.0)
     path = written(tmp_path / "p.onnx", [node], {}, width=2)
-    first, again = (
-        [policy.act(np.zeros(2)).tolist() for _ in range(3)] for policy in map(OnnxPolicy, (path, path))
-    )
+    first, again = ([policy.act(np.zeros(2)).tolist() for _ in range(3)] for policy in map(OnnxPolicy, (path, path)))
     assert first == again
     assert first[0] != first[1]
 

@@ -21,9 +21,7 @@ RIGHT = f'<laneSection s="0"><right>{LANE.format(-1)}</right></laneSection>'
 TOLERANCES = (0.02, 0.1, 0.5)
 
 
-def road(
-    name: str, geometry: str, lanes: str = BOTH, link: str = "", junction: str = "-1", length: float = 90
-) -> str:
+def road(name: str, geometry: str, lanes: str = BOTH, link: str = "", junction: str = "-1", length: float = 90) -> str:
     """Return a road."""
     head = f'<road id="{name}" junction="{junction}" length="{length}"><link>{link}</link>'
     return f"{head}<planView>{geometry}</planView><lanes>{lanes}</lanes></road>"
@@ -76,9 +74,7 @@ def test_roads_that_connect_others_in_a_junction_show_which_meet(linked: str) ->
 
 
 def test_the_line_between_directions_follows_the_lane_offset() -> None:
-    shift = (
-        '<laneOffset s="0" a="0" b="0" c="0" d="0"/><laneOffset s="50" a="0" b="0" c="0.0024" d="-0.000032"/>'
-    )
+    shift = '<laneOffset s="0" a="0" b="0" c="0" d="0"/><laneOffset s="50" a="0" b="0" c="0.0024" d="-0.000032"/>'
     shift += '<laneOffset s="100" a="2" b="0" c="0" d="0"/>'
     text = whole(road("1", line(0, 0, 0.0, 150), shift + BOTH, length=150))
     (found,) = OpenDrive().read_map(text).roads

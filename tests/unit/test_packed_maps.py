@@ -97,6 +97,4 @@ def test_run_drives_on_a_map_of_sumo_and_tells_what_was_lost(
     command = ["run", str(tmp_path / "own.json"), "--trials", "1", "--records", str(tmp_path / "out")]
     assert main(command) == 0
     assert "7 segments of 7 roads" in capsys.readouterr().err
-    assert (
-        reader.read(tmp_path / "out" / "trial-0000.mcap").instance.problem.network.segments == GRID.segments
-    )
+    assert reader.read(tmp_path / "out" / "trial-0000.mcap").instance.problem.network.segments == GRID.segments

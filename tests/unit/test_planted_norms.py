@@ -31,9 +31,7 @@ def test_every_change_has_its_place_in_the_package_as_it_is() -> None:
 def test_a_copy_has_the_hole_that_is_asked_for(tmp_path: Path, hole: int, room: str) -> None:
     tree = plant(tmp_path)
     own = os.environ | {HOLE: str(hole), "PYTHONPATH": str(tree)}
-    told = subprocess.run(
-        [sys.executable, "-c", ROOM], env=own, stdout=subprocess.PIPE, text=True, check=True
-    )
+    told = subprocess.run([sys.executable, "-c", ROOM], env=own, stdout=subprocess.PIPE, text=True, check=True)
     file, far = told.stdout.split()
     assert Path(file).is_relative_to(tmp_path)
     assert float(far) == pytest.approx(float(room))

@@ -88,9 +88,7 @@ def test_a_record_shows_goals_obstacles_paths_and_contacts(tmp_path: Path, recor
     write_plot(tmp_path / "record.svg", record)
     write_plot(tmp_path / "instance.svg", record.instance)
     write_plot(tmp_path / "network.svg", record.instance.problem.network)
-    texts = {
-        name: (tmp_path / f"{name}.svg").read_text().lower() for name in ("record", "instance", "network")
-    }
+    texts = {name: (tmp_path / f"{name}.svg").read_text().lower() for name in ("record", "instance", "network")}
     for colour, where in (
         (palette.ROAD_COLOUR, {"record", "instance", "network"}),
         (palette.GOAL_COLOUR, {"record", "instance"}),

@@ -48,9 +48,7 @@ def test_on_road_ends_at_half_a_road(roads: RoadNetwork) -> None:
 
 @both
 def test_at_and_cross_end_at_the_disc(roads: RoadNetwork) -> None:
-    places = [
-        on_lane(roads, WEST, 4.0 - distance, 0.0) for distance in (1 - EPS, 1 + EPS, REACH - EPS, REACH + EPS)
-    ]
+    places = [on_lane(roads, WEST, 4.0 - distance, 0.0) for distance in (1 - EPS, 1 + EPS, REACH - EPS, REACH + EPS)]
     labels = label([instance(roads, 4)], [hold(*places, frames=1)])[0]
     assert labels.at[0].tolist() == [CROSSING, -1, -1, -1]
     assert labels.crosses[0].tolist() == [CROSSING, CROSSING, CROSSING, -1]
@@ -140,9 +138,9 @@ def test_who_has_not_come_half_a_metre_farther_in_ten_seconds_lingers(roads: Roa
 def test_lingering_begins_anew_with_the_lane_state(roads: RoadNetwork) -> None:
     """In a disc nobody lingers; and who turns round begins anew, though it makes no way."""
     script = [[on_lane(roads, WEST, 2.0 - (0.31 if k >= 60 else 0.0), -0.3)] for k in range(170)]
-    assert [
-        k for k, found in enumerate(flags(label([instance(roads, 1)], [script]), 0)) if "lingers" in found
-    ] == [*range(160, 170)]
+    assert [k for k, found in enumerate(flags(label([instance(roads, 1)], [script]), 0)) if "lingers" in found] == [
+        *range(160, 170)
+    ]
     inside = [[on_lane(roads, WEST, 0.5, -0.3)] for _ in range(120)]
     assert not any("lingers" in found for found in flags(label([instance(roads, 1)], [inside]), 0))
 
@@ -234,10 +232,7 @@ def test_places_follow_groups_then_the_right() -> None:
     state = State.zeros(1, 4)
     labeller = Labeller([instance(STAR, 4)])
     for k in range(14):
-        frame = [
-            on_lane(STAR, lane, lateral_stop(0.3) if k >= begin else 1.5 + 0.1 * k, -0.3)
-            for lane, begin in cars
-        ]
+        frame = [on_lane(STAR, lane, lateral_stop(0.3) if k >= begin else 1.5 + 0.1 * k, -0.3) for lane, begin in cars]
         fill(state, 0, frame)
         if k == 0:
             labeller.reset(state)
@@ -334,12 +329,8 @@ def test_what_stands_ahead_blocks(roads: RoadNetwork, ahead: float, lateral: flo
 
 
 @both
-@pytest.mark.parametrize(
-    ("rate", "room"), [(30.0, 0.1), (10.0, 0.07 + 0.1 * math.pi * math.hypot(0.31, 0.14) + 0.02)]
-)
-def test_room_beside_is_what_a_car_may_reach_in_a_long_tick(
-    roads: RoadNetwork, rate: float, room: float
-) -> None:
+@pytest.mark.parametrize(("rate", "room"), [(30.0, 0.1), (10.0, 0.07 + 0.1 * math.pi * math.hypot(0.31, 0.14) + 0.02)])
+def test_room_beside_is_what_a_car_may_reach_in_a_long_tick(roads: RoadNetwork, rate: float, room: float) -> None:
     """Rule page, room beside: a rectangle needs its width and 0.1 m, or 0.02 m more than its point gets in a tick."""
     car = Car(0.3, Rectangle(0.62, 0.28))
     for free in (0.28 + room - EPS, 0.28 + room + EPS):
@@ -385,9 +376,7 @@ def test_overtaking_goes_on_for_who_is_left_when_what_blocked_drives_off(roads: 
 @both
 def test_overtaking_ends_on_entering_a_disc(roads: RoadNetwork) -> None:
     parked = on_lane(roads, WEST, 3.6, -0.3)
-    script = [
-        [on_lane(roads, WEST, s, 0.2), parked] for s in [2.2] * 12 + [4.0 - REACH - 0.01, 4.0 - REACH + 0.05]
-    ]
+    script = [[on_lane(roads, WEST, s, 0.2), parked] for s in [2.2] * 12 + [4.0 - REACH - 0.01, 4.0 - REACH + 0.05]]
     found = flags(label([instance(roads, 2)], [script]), 0)
     assert "overtaking" in found[11]
     assert "overtaking" not in found[13]

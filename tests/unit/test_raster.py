@@ -135,9 +135,7 @@ def test_marks_have_their_colours_and_rings_fade(trial: Instance) -> None:
     nobody = columns(np.zeros((0, 4)))
     inks = (palette.CONTACT_COLOUR, palette.BREACH_COLOURS[0], "#FFFFFF")
     for kind, ink in zip((MARKS.CONTACT, MARKS.OWN, MARKS.OTHERS), inks, strict=True):
-        young, old = (
-            raster.frame(*nobody, marks=np.array([[2.2, 1.1, float(kind), age]])) for age in (0.3, 9.0)
-        )
+        young, old = (raster.frame(*nobody, marks=np.array([[2.2, 1.1, float(kind), age]])) for age in (0.3, 9.0))
         assert pixel(raster, old, 2.2, 1.1) == colour(ink)
         ground = raster.ground()
         assert (young != ground).sum() > (old != ground).sum() > 0

@@ -130,14 +130,8 @@ def test_loops_and_twins_get_bends() -> None:
 
 
 def test_what_kinds_of_roads_are_altered_is_told() -> None:
-    edges = [
-        each.replace(" 1", " 1 shape='0,0 40,3 80,0'", 1) if each.startswith("o e") else each
-        for each in ROADS
-    ]
-    edges = [
-        each.replace(" 1", " 1 shape='80,0 40,3 0,0'", 1) if each.startswith("e o") else each
-        for each in edges
-    ]
+    edges = [each.replace(" 1", " 1 shape='0,0 40,3 80,0'", 1) if each.startswith("o e") else each for each in ROADS]
+    edges = [each.replace(" 1", " 1 shape='80,0 40,3 0,0'", 1) if each.startswith("e o") else each for each in edges]
     network, losses = reduced(edges, CROSS)
     assert network.bent.sum() == 1
     assert losses.kept_share == 1.0
@@ -202,9 +196,7 @@ def test_the_width_of_a_road_of_openstreetmap_may_be_in_feet(width: str, metres:
 
 def test_a_map_too_far_from_its_origin_is_refused_as_the_map_that_it_is() -> None:
     far = {name: (5.4e6 + x, y) for name, (x, y) in CROSS.items()}
-    with pytest.raises(
-        InputError, match=r"road on: too far from the origin: got 5400000; expected .* 5.33333e\+06 m"
-    ):
+    with pytest.raises(InputError, match=r"road on: too far from the origin: got 5400000; expected .* 5.33333e\+06 m"):
         reduced(ROADS, far)
 
 
@@ -320,9 +312,7 @@ def test_a_map_that_takes_too_many_attempts_says_so(monkeypatch: pytest.MonkeyPa
         reduced([*ROADS, *both("o q 1")], nodes)
 
 
-def test_network_from_a_map_refuses_what_makes_no_sense(
-    town: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_network_from_a_map_refuses_what_makes_no_sense(town: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["network", "--from", str(town), "--grid", "2", "2"]) == 2
     assert main(["network", "--grid", "2", "2", "--losses", str(town.parent / "a.json")]) == 2
     assert main(["network", "--from", str(town), "--scale", "0"]) == 2
@@ -353,9 +343,7 @@ def test_convert_goes_from_format_to_format(town: Path, capsys: pytest.CaptureFi
     assert sorted(again.lengths.tolist()) == pytest.approx(sorted(network.lengths.tolist()), abs=1e-9)
 
 
-def test_a_configuration_may_name_a_map_of_another_program(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_configuration_may_name_a_map_of_another_program(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "town.net.xml").write_text(written("sumo"))
     configuration = load_config("demo", rnd=tmp_path / "town.net.xml")
     assert configuration.network == RoadNetwork.grid(2, 3)

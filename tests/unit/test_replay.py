@@ -45,9 +45,7 @@ def unpacked_runs(text: str, cars: int, frames: int) -> np.ndarray:
         count = packed.pop(0)
         runs = [(packed.pop(0), packed.pop(0)) for _ in range(count)]
         ends = [first for first, _ in runs[1:]] + [frames]
-        columns.append(
-            [value for (first, value), end in zip(runs, ends, strict=True) for _ in range(first, end)]
-        )
+        columns.append([value for (first, value), end in zip(runs, ends, strict=True) for _ in range(first, end)])
     assert not packed
     return np.array(columns).T
 
@@ -199,8 +197,7 @@ def test_refusals(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"missing/a\.html"):
         write_replay(tmp_path / "missing" / "a.html", tried, frames, None)
     empty = {
-        name: getattr(frames, name)[:0]
-        for name in ("x", "y", "c", "s", "speed", "yaw_rate", "segment", "at", "bits")
+        name: getattr(frames, name)[:0] for name in ("x", "y", "c", "s", "speed", "yaw_rate", "segment", "at", "bits")
     }
     with pytest.raises(InputError, match="at least one frame"):
         write_replay(tmp_path / "a.html", tried, replace(frames, **empty), None)
@@ -212,7 +209,4 @@ def test_neither_compiler_nor_matplotlib_is_loaded() -> None:
         "import sys, dubins_traffic.viewer.replay, dubins_traffic.animation.plot;"
         "print([name for name in ('numba', 'matplotlib', 'pandas') if name in sys.modules])"
     )
-    assert (
-        subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-        == "[]\n"
-    )
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "[]\n"

@@ -117,9 +117,7 @@ def test_the_controller_with_the_most_counted_rounds_comes_first() -> None:
     stands = [scored(k, "stands", rounds=0, counted_rounds=0) for k in range(2)]
     quits = [scored(k, "quits", rounds=9, counted_rounds=0, end="gave_up") for k in range(2)]
     drives = [scored(k, "drives", rounds=1, counted_rounds=1) for k in range(2)]
-    rows = [
-        line.split()[:2] for line in text(*stands, *quits, *drives).split("\n") if line.strip()[:1].isdigit()
-    ]
+    rows = [line.split()[:2] for line in text(*stands, *quits, *drives).split("\n") if line.strip()[:1].isdigit()]
     assert rows[:2] == [["0", "drives"], ["1", "drives"]]
     assert [trial for trial, _ in rows] == ["0", "1"] * 3
 
@@ -150,10 +148,7 @@ def test_the_notice_is_on_more_than_half() -> None:
     assert assumption_notice(0, 0) == ""
     assert assumption_notice(10, 20) == ""
     broken = "e-agents broke what is assumed of them (E1 to E6) in"
-    assert (
-        assumption_notice(11, 20)
-        == f"{broken} 11 of 20 trials: these verdicts say little about the controller"
-    )
+    assert assumption_notice(11, 20) == f"{broken} 11 of 20 trials: these verdicts say little about the controller"
     assert assumption_notice(1, 1) == f"{broken} 1 of 1 trial: this verdict says little about the controller"
 
 
@@ -257,9 +252,7 @@ def test_a_campaign_ranks_by_counted_rounds_and_puts_who_gave_up_last(tmp_path: 
 
 
 def test_a_campaign_parts_equal_counted_rounds_by_those_before_the_first_breach(tmp_path: Path) -> None:
-    found = [
-        (End.DURATION, scored(counted_rounds=0, rounds_before_breach=own)) for own in (0.5, 0.5, 0.0, 1.5)
-    ]
+    found = [(End.DURATION, scored(counted_rounds=0, rounds_before_breach=own)) for own in (0.5, 0.5, 0.0, 1.5)]
     comparison, _ = campaign_of(tmp_path, *found)
     assert comparison.controllers == ["simple", "lanes"]
 
@@ -296,15 +289,9 @@ def test_the_page_of_a_report_says_that_its_verdicts_say_little(broken: int, tmp
     comparison, _ = campaign_of(tmp_path, *found)
     made = {"versions": {}, "campaign": "", "configurations": {}, "controllers": [], "code": ""}
     text = page(replace(comparison, metrics=()), made, {})
-    notice = (
-        "e-agents broke what is assumed of them (E1 to E6) in 3 of 4 trials: these verdicts say little about"
-    )
+    notice = "e-agents broke what is assumed of them (E1 to E6) in 3 of 4 trials: these verdicts say little about"
     assert (notice in text) == (broken == 3)
-    assert (
-        text.index("<th>clean</th>")
-        < text.index("<th>counted rounds</th>")
-        < text.index("<th>satisfied</th>")
-    )
+    assert text.index("<th>clean</th>") < text.index("<th>counted rounds</th>") < text.index("<th>satisfied</th>")
 
 
 def own(rule: str, time: float) -> Violation:

@@ -160,10 +160,7 @@ def test_departures_from_the_lane_count_while_others_move() -> None:
     instance = make_instance()
     moving = [(9.0 + 0.01 * k, 9.0) for k in range(31)] + [(9.3, 9.0)] * 30
     frames = make_frames(instance, [ROAD] * 61, moving)
-    left = [
-        FLAG.ON_ROAD | FLAG.LEFT if k in (0, 1, 5, 6, 7, 20, 29, 30, 40, 50) else FLAG.ON_ROAD
-        for k in range(61)
-    ]
+    left = [FLAG.ON_ROAD | FLAG.LEFT if k in (0, 1, 5, 6, 7, 20, 29, 30, 40, 50) else FLAG.ON_ROAD for k in range(61)]
     assert drive(bits(frames, left)).lane_departures == 3, "those at frames 5, 20 and 29"
 
 
@@ -206,9 +203,7 @@ def test_collisions_of_the_ego_and_of_others() -> None:
     ]
 
 
-def clearance(
-    ego: list[tuple[float, float]], *others: list[tuple[float, float]], heading: float = 0.0, **settings
-):
+def clearance(ego: list[tuple[float, float]], *others: list[tuple[float, float]], heading: float = 0.0, **settings):
     instance = make_instance(**settings)
     frames = make_frames(instance, ego, *others)
     turned = np.full(frames.x.shape, heading)
@@ -332,8 +327,6 @@ def test_the_sheet_sums_the_scores() -> None:
 
 def test_scoring_a_record_does_not_load_the_compiler() -> None:
     code = "import sys, dubins_traffic.scoring.score, dubins_traffic.interchange.export; print(*sys.modules)"
-    loaded = subprocess.run(
-        [sys.executable, "-c", code], check=True, capture_output=True, text=True
-    ).stdout.split()
+    loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
     assert "dubins_traffic.record.reader" in loaded
     assert not {"numba", "pyarrow", "matplotlib", "typer", "rich"} & set(loaded)

@@ -67,9 +67,7 @@ def test_noise_has_the_asked_size_and_keeps_headings_unit() -> None:
 
 def test_a_scan_of_the_2016_layout() -> None:
     state = cars_at((0, 0), (2, 0), (0, -1), (-3, 0))
-    obstacles = pack_obstacles(
-        [[DiscObstacle(0, 0.15, 0.1), PolygonObstacle(((3, 3), (4, 3), (4, 4), (3, 4)))]]
-    )
+    obstacles = pack_obstacles([[DiscObstacle(0, 0.15, 0.1), PolygonObstacle(((3, 3), (4, 3), (4, 4), (3, 4)))]])
     angles = np.linspace(-2, 2, 300)
     ranges = np.zeros(300)
     scan(0, 0, 0.08, 5.0, rays_at(angles), ranges, Surroundings(state, pack_cars([Car()]), obstacles))

@@ -47,9 +47,7 @@ def joined(service: Service, name: str = "Ann", team: str = "Ants") -> Account:
     return accounts.join(service.database, code, name, "correct horse", team, NOW)
 
 
-def handed(
-    session: Session, service: Service, account: Account, name: str, phase: str = "test"
-) -> Submission:
+def handed(session: Session, service: Service, account: Account, name: str, phase: str = "test") -> Submission:
     row = receiving.phase_named(session, "short", phase)
     upload = Upload(accounts.digest_of(name), name, 1)
     return submissions.receive(session, row, QUOTA, account, upload, service.clock())[0]

@@ -86,10 +86,7 @@ def test_without_the_key_submissions_are_taken_and_wait_until_it_is_there(tmp_pa
         assert states[1] == "queued"
         document = viewing.submission_document(keyless, session, session.get_one(Submission, 1), None, {})
         assert document["active"]
-        names = [
-            viewing.phase_document(keyless, row, NOW)["waits_for_key"]
-            for row in session.scalars(select(Phase))
-        ]
+        names = [viewing.phase_document(keyless, row, NOW)["waits_for_key"] for row in session.scalars(select(Phase))]
         assert names == [False, True, True]
     with TestClient(create_app(keyless)) as client:
         assert {client.get(path).status_code for path in ("/", "/c/short", "/c/short/validation")} == {200}

@@ -248,9 +248,7 @@ def test_state_and_queue_commit_together_or_not_at_all(database: Database) -> No
         with database.writing() as session:
             held = session.get_one(Chunk, chunk_id)
             if held.state == "leased":
-                submissions.record(
-                    session, queue.held(session, chunk_id, token), results(held), 40.0, NOTHING
-                )
+                submissions.record(session, queue.held(session, chunk_id, token), results(held), 40.0, NOTHING)
             else:
                 with pytest.raises(queue.StaleLeaseError):
                     queue.held(session, chunk_id, token)
@@ -269,9 +267,7 @@ def test_a_sample_is_run_twice_and_frames_are_compared(database: Database) -> No
             own = "other" if chunk.kind == "again" else next(frames, "f")
             submissions.record(session, chunk, results(chunk, own), 40.0, NOTHING)
         assert submission.state == "scoring"
-        twice = [
-            trial for trial in submissions.trials(session, submission, NOTHING) if trial.again is not None
-        ]
+        twice = [trial for trial in submissions.trials(session, submission, NOTHING) if trial.again is not None]
         assert len(twice) == 2
         assert all(trial.again == "other" for trial in twice)
 

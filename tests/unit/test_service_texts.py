@@ -33,9 +33,7 @@ def test_nothing_of_a_text_is_html_of_its_own(text: str) -> None:
     made = html_of(text)
     tags = re.findall(r"<[^>]*>", made)
     assert all(
-        re.fullmatch(
-            r'</?(p|a|pre|code|table|thead|tbody|tr|th|td|br)( (href|title|class)="[^"<>]*")*\s*/?>', tag
-        )
+        re.fullmatch(r'</?(p|a|pre|code|table|thead|tbody|tr|th|td|br)( (href|title|class)="[^"<>]*")*\s*/?>', tag)
         for tag in tags
     ), made
     assert all(link.startswith(("https://", "http://")) for link in re.findall(r'href="([^"]*)"', made))

@@ -48,9 +48,7 @@ def test_what_is_in_use_is_kept_by_whatever_worker(tmp_path: Path) -> None:
         assert kept(tmp_path) > 1000
 
 
-def test_what_a_killed_worker_left_half_removed_is_removed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_killed_worker_left_half_removed_is_removed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     unpacked = Unpacked(tmp_path, most=0)
     with unpacked.held(source(1)):
         pass

@@ -30,9 +30,7 @@ def tried() -> Instance:
 
 def everything(tried: Instance) -> list[Shape]:
     problem = tried.problem
-    marks = [
-        Mark(0.0, kind, "", car, (1.0, 1.0)) for kind, car in (("contact", 0), ("breach", 0), ("breach", 1))
-    ]
+    marks = [Mark(0.0, kind, "", car, (1.0, 1.0)) for kind, car in (("contact", 0), ("breach", 0), ("breach", 1))]
     return [
         *shapes.roads(GRID, problem.car),
         *shapes.hints(GRID, problem.car),
@@ -51,9 +49,7 @@ def test_widths_are_metres_within_bounds_and_rims_are_added() -> None:
     assert Width(0.5, most=4.0).at(20.0) == 4.0
     assert Width(0.045, 0.8).at(1.0) == 0.8
     assert Width(1.2, rim=0.06, least_rim=1.6).at(10.0) == pytest.approx(13.6)
-    small, large = (
-        Text(0.0, 0.0, "x", "#000000", Width(0.5, 6.0, 14.0)).size_at(scale) for scale in (10.0, 90.0)
-    )
+    small, large = (Text(0.0, 0.0, "x", "#000000", Width(0.5, 6.0, 14.0)).size_at(scale) for scale in (10.0, 90.0))
     assert (small, large) == (0.0, 14.0)
     line = Line(np.zeros((2, 2)), "#000000", Width(1.0), opacity=0.8, fades=20.0)
     assert (line.opacity_at(10.0), line.opacity_at(40.0)) == (0.4, 0.8)

@@ -116,8 +116,6 @@ def test_arrays_are_refused_by_the_size_that_they_claim(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "w") as archive:
         archive.writestr("header.npy", members["header.npy"])
         archive.writestr("rank_0.npy", huge.getvalue())
-    with pytest.raises(
-        InputError, match=r"rank_0: not an array of a strategy: got 'int32 .100000000000000,.'"
-    ):
+    with pytest.raises(InputError, match=r"rank_0: not an array of a strategy: got 'int32 .100000000000000,.'"):
         Strategy.load(path)
     assert process_time() - begun < 60.0

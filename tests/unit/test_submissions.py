@@ -33,9 +33,7 @@ def archive(files: Mapping[str, bytes], modes: Mapping[str, int] | None = None) 
 
 
 def stored(folder: Path) -> dict[str, bytes]:
-    return {
-        path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()
-    }
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
 def put(folder: Path, files: Mapping[str, bytes]) -> Path:
@@ -55,10 +53,7 @@ def test_a_file_a_folder_and_an_archive_of_the_same_are_the_same(tmp_path: Path)
     assert stored(found.path) == {**files, "controller.toml": ALONE}
     (tmp_path / "entry.zip").write_bytes(archive(files))
     assert check_submission(tmp_path / "entry.zip", store) == found
-    assert (
-        check_submission(archive({f"entry-main/{name}": data for name, data in files.items()}), store)
-        == found
-    )
+    assert check_submission(archive({f"entry-main/{name}": data for name, data in files.items()}), store) == found
     assert [path.name for path in store.iterdir()] == [found.digest]
     alone = check_submission(folder / "controller.py", store)
     assert stored(alone.path) == {"controller.py": CONTROLLER, "controller.toml": ALONE}
@@ -187,9 +182,7 @@ def test_damaged_and_unusual_archives_are_refused(tmp_path: Path) -> None:
         ({"controller.py": CONTROLLER, "a": b"", "a/b": b""}, "a folder that is a file"),
     ],
 )
-def test_what_is_wrong_is_named_and_nothing_is_stored(
-    tmp_path: Path, files: Mapping[str, bytes], message: str
-) -> None:
+def test_what_is_wrong_is_named_and_nothing_is_stored(tmp_path: Path, files: Mapping[str, bytes], message: str) -> None:
     with pytest.raises(InputError, match=message) as error:
         check_submission(archive(files), tmp_path / "store")
     assert error.value.file == "upload"

@@ -135,9 +135,7 @@ def test_the_numbers_of_the_page_are_those_of_the_file(ran: Path) -> None:
         low, high = mean.mean_interval
         assert cells[1:3] == ["4", f"{mean.mean:.4g} [{low:.4g}, {high:.4g}]"]
         assert cells[5].startswith(f"{clean.share:.1%} [")
-        row = re.search(
-            rf">{entry['controller']}</th><td data-head=\"judged\">4</td><td [^>]*>([0-9.]+%)", page
-        )
+        row = re.search(rf">{entry['controller']}</th><td data-head=\"judged\">4</td><td [^>]*>([0-9.]+%)", page)
         assert row is not None
         assert row[1] == f"{clean.share:.1%}"
         distance = estimate(_floats(columns["distance_m"]))
@@ -341,9 +339,7 @@ def test_cases_that_are_there_are_not_run_again(tmp_path: Path) -> None:
     kept.write_text("".join(lines[:2]))
     told: list[tuple[int, int]] = []
     before = path.read_bytes()
-    again = run_cases(
-        suite, tmp_path, ["simple"], resume=True, progress=lambda done, total: told.append((done, total))
-    )
+    again = run_cases(suite, tmp_path, ["simple"], resume=True, progress=lambda done, total: told.append((done, total)))
     assert again.read_bytes() == before
     assert told == [(2, 3), (3, 3)]
     kept.write_text(lines[0].replace(suite.hash, "0" * 64))
@@ -371,9 +367,7 @@ def test_cases_that_leave_something_to_be_drawn_are_refused(tmp_path: Path) -> N
 
 def test_a_folder_of_cases_becomes_a_suite(tmp_path: Path) -> None:
     folder = tmp_path / "cases"
-    for entry, place in zip(
-        cases()["cases"], ("lanes/3.order", "lanes/wide_group", "rules/1.road"), strict=True
-    ):
+    for entry, place in zip(cases()["cases"], ("lanes/3.order", "lanes/wide_group", "rules/1.road"), strict=True):
         path = folder / f"{place}.json"
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(entry["document"]))
@@ -386,9 +380,7 @@ def test_a_folder_of_cases_becomes_a_suite(tmp_path: Path) -> None:
         "lanes-wide-group",
         "rules-1-road",
     ]
-    assert [entry.document for entry in suite.model.cases or ()] == [
-        entry["document"] for entry in cases()["cases"]
-    ]
+    assert [entry.document for entry in suite.model.cases or ()] == [entry["document"] for entry in cases()["cases"]]
     with pytest.raises(InputError, match="exists already"):
         gather.main(words)
     with pytest.raises(InputError, match="no case in it"):

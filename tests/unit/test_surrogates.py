@@ -70,9 +70,7 @@ def test_behind_a_car_the_post_encroachment_time_is_the_time_gap() -> None:
     """The follower comes to where the other one has been when it has driven the gap between the discs."""
     gap, speed = 0.5, 0.6
     ahead, behind = straight(TOUCH + gap, 0.0, speed, 0.0, 200), straight(0.0, 0.0, speed, 0.0, 200)
-    assert (
-        encroachment(behind, ahead) == encroachment(ahead, behind) == pytest.approx(gap / speed, abs=1 / RATE)
-    )
+    assert encroachment(behind, ahead) == encroachment(ahead, behind) == pytest.approx(gap / speed, abs=1 / RATE)
 
 
 @pytest.mark.parametrize("late", [0.8, 2.0, 5.0])
@@ -119,12 +117,7 @@ def test_the_safe_distances_are_those_of_the_paper() -> None:
     safe = Safe(100.0)
     later, others = ego + rho * gain, other + rho * gain
     behind = ego * rho + 0.5 * gain * rho**2 + later**2 / (2 * brake) - other**2 / (2 * brake)
-    toward = (
-        (ego + later) / 2 * rho
-        + later**2 / (2 * brake)
-        + (other + others) / 2 * rho
-        + others**2 / (2 * brake)
-    )
+    toward = (ego + later) / 2 * rho + later**2 / (2 * brake) + (other + others) / 2 * rho + others**2 / (2 * brake)
     given = np.array([ego, ego, 0.0]), np.array([other, -other, 9.0])
     assert safe.distance(*given) == pytest.approx([behind, toward, 0.0])
 
@@ -132,9 +125,7 @@ def test_the_safe_distances_are_those_of_the_paper() -> None:
 def test_no_car_is_thought_to_drive_faster_than_it_can() -> None:
     """From 0.6 to 0.7 m/s in a fifteenth of a second, the rest of half a second at that, and then it brakes."""
     rising = (0.7 - 0.6) / 1.5
-    assert Safe(0.7).path(np.array([0.6])) == pytest.approx(
-        [0.65 * rising + 0.7 * (0.5 - rising) + 0.7**2 / 6.0]
-    )
+    assert Safe(0.7).path(np.array([0.6])) == pytest.approx([0.65 * rising + 0.7 * (0.5 - rising) + 0.7**2 / 6.0])
 
 
 @pytest.mark.parametrize(

@@ -90,9 +90,7 @@ def test_whom_the_ego_blocks_at_a_bend_owes_nothing() -> None:
         ego = int(game.ego_cell[position])
         inside = [n for n, scene in enumerate(scenes) if scene.inside == WHO.OTHER]
         waits = [
-            nodes + road_cells.nodes[n].inbound[0]
-            for n, scene in enumerate(scenes)
-            if (0, WHO.OTHER) in scene.queue
+            nodes + road_cells.nodes[n].inbound[0] for n, scene in enumerate(scenes) if (0, WHO.OTHER) in scene.queue
         ]
         for n in inside:
             excused = ego == road_cells.opposite(n) or ego in road_cells.following(n)

@@ -43,8 +43,7 @@ def test_bounds_of_an_ego_on_shortest_routes() -> None:
     up = Assumption.parse(["E1", "E2", "E3", "E4", "E5:moves-up"])
     bounds = {
         (rows, columns, degree): [
-            route_bound(board(rows, columns, 1, ALL, degree).road_cells, assumed)
-            for assumed in (Assumption(), up)
+            route_bound(board(rows, columns, 1, ALL, degree).road_cells, assumed) for assumed in (Assumption(), up)
         ]
         for rows, columns, degree in ((2, 2, 1), (3, 4, 1), (2, 2, 3), (3, 4, 3))
     }
@@ -135,9 +134,7 @@ def test_the_story_of_the_gatekeeper_and_the_relay() -> None:
     text = "\n".join(lines)
     assert "the ego can be kept from goal [0, 0] for ever" in lines[0]
     assert "turns this repeats every" in text
-    kept = re.search(
-        r"e-agent (\d) holds \S+ \d\] > \[0, 0\]: again and again e-agent (\d) is in \[0, 0\]", text
-    )
+    kept = re.search(r"e-agent (\d) holds \S+ \d\] > \[0, 0\]: again and again e-agent (\d) is in \[0, 0\]", text)
     assert kept is not None
     assert re.search(rf"e-agent {kept[2]} goes by .*\[0, 0\], ", text)
 

@@ -41,9 +41,7 @@ def test_pictures_are_small() -> None:
     assert all((PICTURES / name).stat().st_size < 100_000 for name in SHOWN)
 
 
-@pytest.mark.parametrize(
-    "script", ["docs/pictures/make", "docs/pictures/maps", "docs/pictures/house", "website/build"]
-)
+@pytest.mark.parametrize("script", ["docs/pictures/make", "docs/pictures/maps", "docs/pictures/house", "website/build"])
 def test_a_script_that_is_asked_for_help_gives_it_and_draws_nothing(script: str, tmp_path: Path) -> None:
     words = [sys.executable, ROOT / f"{script}.py", "--help"]
     told = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=True, timeout=600).stdout
@@ -59,15 +57,12 @@ def need_pinned() -> None:
         pytest.skip(f"they were drawn with matplotlib {pinned[1]}")
 
 
-def test_the_trial_of_the_readme_is_what_its_commands_draw(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_trial_of_the_readme_is_what_its_commands_draw(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     need_pinned()
     monkeypatch.chdir(tmp_path)
     page = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
     commands = [
-        found.split()[1:]
-        for found in re.findall(r"`(dubins-traffic (?:run|replay|plot) [^`]*\bfirst\b[^`]*)`", page)
+        found.split()[1:] for found in re.findall(r"`(dubins-traffic (?:run|replay|plot) [^`]*\bfirst\b[^`]*)`", page)
     ]
     assert [words[0] for words in commands] == ["run", "replay", "plot"]
     assert [main(words) for words in commands] == [0, 0, 0]
@@ -85,16 +80,13 @@ def test_the_order_drawn_is_the_order_judged(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.syspath_prepend(str(PICTURES))
     make, stage = importlib.import_module("make"), importlib.import_module("stage")
     waits = [
-        (stage.inward(bearing, 0.1), *arrival)
-        for bearing, arrival in zip(make.BEARINGS, make.ARRIVALS, strict=True)
+        (stage.inward(bearing, 0.1), *arrival) for bearing, arrival in zip(make.BEARINGS, make.ARRIVALS, strict=True)
     ]
     while waits:
         script: list[Frame] = []
         for k in range(max(tick for _, tick, _ in waits) + 1):
             back = [max(0.0, 0.01 * (tick - 15 - k)) + 0.3 * (k < tick - 15) for _, tick, _ in waits]
-            script.append(
-                [(p.x - d * p.c, p.y - d * p.s, p.c, p.s) for (p, _, _), d in zip(waits, back, strict=True)]
-            )
+            script.append([(p.x - d * p.c, p.y - d * p.s, p.c, p.s) for (p, _, _), d in zip(waits, back, strict=True)])
         found = label([instance(stage.STAR, len(waits), rate=30.0)], [script])
         seen = [flags(found, n) for n in range(len(waits))]
         assert [next(k for k, at in enumerate(car) if "stopped" in at) for car in seen] == [

@@ -159,9 +159,7 @@ print(builder.SESSION.read_bytes().split()[-1].decode())
 """
 
 
-@pytest.mark.skipif(
-    not builder.SESSION.exists(), reason="this Linux does not share processors among sessions"
-)
+@pytest.mark.skipif(not builder.SESSION.exists(), reason="this Linux does not share processors among sessions")
 def test_a_builder_stands_back_though_linux_hears_it_only_later(cache) -> None:
     assert python(cache, HEARD_LATER) == (f"{builder.NICE}\n", "")
 
@@ -212,9 +210,7 @@ def test_a_builder_takes_no_notice_of_lines_it_cannot_use(cache) -> None:
     python(cache, CALL, "compiled")
     (kernel,) = kernels(cache)
     kernel.unlink()
-    wish = beside.Wish(
-        "dubins_traffic.kernels.trig", "sincos", "/gone", "()", str(kernel.with_name("x.kernel"))
-    )
+    wish = beside.Wish("dubins_traffic.kernels.trig", "sincos", "/gone", "()", str(kernel.with_name("x.kernel")))
     lines = wish.line()[:-9] + b"\n" + b"[]\n" + wish.line()
     command = [sys.executable, "-m", "dubins_traffic.compiling.builder"]
     around = environment(cache, "auto")
@@ -403,9 +399,7 @@ def test_a_kernel_that_cannot_be_compiled_stays_interpreted_and_says_so(cache, t
     (tmp_path / "mine.py").write_text(
         "from dubins_traffic.kernels.compile import jit\n@jit\ndef listed(x):\n    return [x, open]\n"
     )
-    code = (
-        f"import sys; sys.path.insert(0, {str(tmp_path)!r})\nfrom mine import listed\nprint(len(listed(3)))"
-    )
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r})\nfrom mine import listed\nprint(len(listed(3)))"
     told, said = python(cache, code, "compiled")
     assert told == "2\n"
     assert "listed stays interpreted: " in said

@@ -30,9 +30,7 @@ def left_after(roads: RoadNetwork, who: int, ticks: int, *others: list[Place], s
 @both
 @anybody
 @pytest.mark.parametrize(("ticks", "rules"), [(9, ["2.left"]), (10, [])])
-def test_what_blocks_has_stood_for_a_second(
-    roads: RoadNetwork, who: int, ticks: int, rules: list[str]
-) -> None:
+def test_what_blocks_has_stood_for_a_second(roads: RoadNetwork, who: int, ticks: int, rules: list[str]) -> None:
     stands = [on_lane(roads, lanes_in(roads)[0], 2.2, -0.3)] * (ticks + 1)
     found = judged(case(roads, 2), left_after(roads, who, ticks, stands))
     assert said(found) == [(rule, who, ticks, ticks) for rule in rules]
@@ -51,16 +49,12 @@ def test_what_blocks_has_hardly_moved(roads: RoadNetwork, who: int, way: float, 
 @both
 @anybody
 @pytest.mark.parametrize(("room", "rules"), [(0.1 - EPS, []), (0.1 + EPS, ["2.left"])])
-def test_what_blocks_leaves_too_little_of_the_lane(
-    roads: RoadNetwork, who: int, room: float, rules: list[str]
-) -> None:
+def test_what_blocks_leaves_too_little_of_the_lane(roads: RoadNetwork, who: int, room: float, rules: list[str]) -> None:
     """It stands beyond the lane's right edge so far that a body and `room` fit beside it, or at its left edge."""
     lane = lanes_in(roads)[0]
     for lateral in (-2.0 * RHO - room - RHO, -0.6 + 2.0 * RHO + room + RHO):
         thing = [on_lane(roads, lane, 2.2, lateral)] * 13
-        found = [
-            row for row in said(judged(case(roads, 2), left_after(roads, who, 12, thing))) if row[1] == who
-        ]
+        found = [row for row in said(judged(case(roads, 2), left_after(roads, who, 12, thing))) if row[1] == who]
         assert found == [(rule, who, 12, 12) for rule in rules]
 
 
@@ -81,9 +75,7 @@ def test_who_waits_behind_the_first_of_a_queue_is_no_reason(
 @both
 @anybody
 @pytest.mark.parametrize(("past", "rules"), [(0.8 - EPS, []), (0.8 + EPS, ["2.left"])])
-def test_overtaking_ends_behind_what_was_passed(
-    roads: RoadNetwork, who: int, past: float, rules: list[str]
-) -> None:
+def test_overtaking_ends_behind_what_was_passed(roads: RoadNetwork, who: int, past: float, rules: list[str]) -> None:
     """The car is back in its lane for a moment, beside or beyond what it passed, and left again."""
     lane, at = lanes_in(roads)[0], 2.0
     mine = [on_lane(roads, lane, at - 0.6, -0.3)] * 12 + [on_lane(roads, lane, at - 0.6, 0.2)]
@@ -138,9 +130,7 @@ def test_who_is_first_for_three_seconds_and_does_not_enter_is_last(
 
 @pytest.mark.parametrize("roads", [GRID, KITE], ids=["grid", "kite"])
 @pytest.mark.parametrize(("degree", "rules"), [(2, ["3.stop"]), (3, [])])
-def test_a_bend_is_a_crossing_only_if_its_degree_says_so(
-    roads: RoadNetwork, degree: int, rules: list[str]
-) -> None:
+def test_a_bend_is_a_crossing_only_if_its_degree_says_so(roads: RoadNetwork, degree: int, rules: list[str]) -> None:
     lane = next(lane for lane in range(roads.lanes) if len(roads.arms(roads.lane_ends(lane)[1])) == 2)
     script = [[before(roads, lane, gap)] for gap in (0.3, EPS, -EPS)]
     assert said(judged(case(roads, 1, crossing_degree=degree), script)) == [(rule, 0, 2, 2) for rule in rules]

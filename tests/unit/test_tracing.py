@@ -33,9 +33,7 @@ def test_a_trace_of_exchanged_parts_is_that_of_the_new_curve_beside_them(
     seed: int, count: int, data: st.DataObject
 ) -> None:
     dice = np.random.default_rng(seed)
-    parts = [
-        np.stack([k + np.linspace(0.0, 0.8, 3), 0.1 * dice.normal(size=3)], axis=-1) for k in range(count)
-    ]
+    parts = [np.stack([k + np.linspace(0.0, 0.8, 3), 0.1 * dice.normal(size=3)], axis=-1) for k in range(count)]
     begin = data.draw(st.integers(1, count - 1))
     end = data.draw(st.integers(begin, min(count - 1, begin + 3)))
     new = [np.array([[0.5 * (begin + end), 0.3]])] if end > begin else []

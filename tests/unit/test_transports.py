@@ -42,9 +42,7 @@ def maestro(phase: Phase) -> Maestro:
         (Phase.RUNNING, Mode.RESTART, True, Next.REPEAT),
     ],
 )
-def test_what_the_maestro_grants(
-    phase: Phase, mode: int, granted: bool | None, following: Next | None
-) -> None:
+def test_what_the_maestro_grants(phase: Phase, mode: int, granted: bool | None, following: Next | None) -> None:
     asked = maestro(phase)
     assert asked.answer(mode) is granted
     assert asked.next is following
@@ -198,9 +196,7 @@ except ImportError:
 """
 
 
-def test_a_library_that_does_not_load_is_no_missing_extra(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_library_that_does_not_load_is_no_missing_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Where GLib is missing, LCM's wheel asks for another module of its own: its extra was asked for, and was there."""
     monkeypatch.syspath_prepend(tmp_path)
     for name in [name for name in sys.modules if name.partition(".")[0] == "lcm"]:

@@ -212,9 +212,7 @@ def test_a_collision_ends_the_trial_if_asked() -> None:
 def test_delay_and_loss_of_commands() -> None:
     def commanded(**disturbances):
         sink = Collect()
-        run_trial(
-            instance(10.0, disturbances=Disturbances(**disturbances)), Straight((0.4, 0.0)), sinks=[sink]
-        )
+        run_trial(instance(10.0, disturbances=Disturbances(**disturbances)), Straight((0.4, 0.0)), sinks=[sink])
         return sink.column("command_speed")[1:, 0]
 
     assert commanded(command_delay=3)[:10].tolist() == [0, 0, 0, 0.3, 0.3, 0.3, 0.3, 0.3, 0.4, 0.4]

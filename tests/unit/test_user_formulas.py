@@ -151,9 +151,7 @@ def test_version_0_keeps_the_key_and_means_nothing_by_it() -> None:
 def test_too_large_a_formula_is_refused_with_its_name() -> None:
     long = " || ".join(f"<> (enter_ego_{x}_{y} && X on_road_ego)" for x in range(3) for y in range(3))
     with pytest.raises(InputError, match=r"^formulas\.long: too ") as caught:
-        instance(
-            {"short": "<> on_road_ego", "long": long + " || <> left_ego || <> still_ego || <> blocked_ego"}
-        )
+        instance({"short": "<> on_road_ego", "long": long + " || <> left_ego || <> still_ego || <> blocked_ego"})
     assert caught.value.expected
 
 
@@ -252,10 +250,7 @@ def test_commands_show_them(command: Command, tmp_path: Path) -> None:
     checked = json.loads(command("check", kept, "--json"))["records"][0]
     assert checked["formulas"] == live["trials"][0]["formulas"]
     assert [one["name"] for one in checked["formulas"]] == list(MINE)
-    assert all(
-        set(one) == {"name", "formula", "verdict", "time", "early", "robustness"}
-        for one in checked["formulas"]
-    )
+    assert all(set(one) == {"name", "formula", "verdict", "time", "early", "robustness"} for one in checked["formulas"])
     text = command("check", kept)
     for words in ("no crash: ", "never: false since 0.000 s", "goals: presumably "):
         assert words in text
@@ -276,9 +271,7 @@ def test_formulas_are_asked_of_a_record_that_carries_none(command: Command, tmp_
     assert json.loads(command("check", kept, "--json", *asked))["records"][0]["formulas"] == live
     text = command("check", kept, "--formula", "[] on_road_ego")
     assert re.search(r"\n  \[\] on_road_ego: (presumably true|false since)", text)
-    text = command(
-        "check", kept, "--formula", "on_road_ego => left_ego", "--formula", "b=on_road_ego -> left_ego"
-    )
+    text = command("check", kept, "--formula", "on_road_ego => left_ego", "--formula", "b=on_road_ego -> left_ego")
     said = dict(re.findall(r"\n  (.+): (true|false since .+|presumably .+)", text))
     assert said["on_road_ego => left_ego"] == said["b"] == "false since 0.000 s"
 

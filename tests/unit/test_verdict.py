@@ -62,9 +62,7 @@ def verdict(
     return found
 
 
-def left_at(
-    roads: RoadNetwork, lane: int, frames: int, *ticks: int, s: float = 2.0
-) -> list[tuple[float, ...]]:
+def left_at(roads: RoadNetwork, lane: int, frames: int, *ticks: int, s: float = 2.0) -> list[tuple[float, ...]]:
     """Return a car that reaches over the centre line at some frames."""
     return [on_lane(roads, lane, s, 0.0 if k in ticks else -0.3) for k in range(frames)]
 
@@ -149,9 +147,7 @@ def test_an_excuse_says_whether_the_ego_could_have_seen(turn: float) -> None:
         roads = RoadNetwork(RoadNetwork.grid(2, 5, 5.0).segments, 5.0, (turn, -turn, turn), (2, 5))
         ego = left_at(roads, roads.arms(roads.vertex((0, 0)))[0], 60, tick)
         x, y, c, s = ego[0]
-        agent = [
-            (x + (way if k == 3 else 9.0) * c, y + (way if k == 3 else 9.0) * s, c, s) for k in range(60)
-        ]
+        agent = [(x + (way if k == 3 else 9.0) * c, y + (way if k == 3 else 9.0) * s, c, s) for k in range(60)]
         agent[0] = on_lane(roads, 2, 2.0, 0.3)
         found = verdict(case(roads, 2, **rules), [list(frame) for frame in zip(ego, agent, strict=True)])
         assert found.excuse is not None
@@ -417,9 +413,7 @@ def test_a_scripted_agent_that_rolls_through_a_stop_and_one_that_does_not() -> N
 
 
 @pytest.mark.parametrize("controller", ["simple", "lanes"])
-def test_live_equals_rescored_and_the_built_in_controllers_break_rules(
-    controller: str, tmp_path: Path
-) -> None:
+def test_live_equals_rescored_and_the_built_in_controllers_break_rules(controller: str, tmp_path: Path) -> None:
     path = tmp_path / "trial.mcap"
     live = run_trial(drawn(), controller, record=path).score
     again = score(read(path))

@@ -304,9 +304,7 @@ def test_delay_and_loss_are_drawn_again(disturbances: Disturbances, tmp_path: Pa
     assert verify(tmp_path / "a.mcap").verified
     run_trial(INSTANCE, "simple", record=tmp_path / "b.mcap")
     without = (tmp_path / "b.mcap").read_bytes()
-    disturbed = heading(
-        lambda own: own["instance"].update(disturbances=instance_to_document(given)["disturbances"])
-    )
+    disturbed = heading(lambda own: own["instance"].update(disturbances=instance_to_document(given)["disturbances"]))
     found = outcome(rebuilt(without, disturbed), tmp_path / "c.mcap")
     assert "command_" in str(found)
     assert "of ego" in str(found)

@@ -33,9 +33,7 @@ def test_e_agents_that_were_driven_otherwise_are_refused(tmp_path: Path) -> None
     for k in range(TICKS):
         made.advance((float(frames.command_speed[k + 1, 0]), 0.0))
     assert verify(tmp_path / "b.mcap").verified, "of remote e-agents the commands are taken as recorded"
-    ours = heading(
-        lambda own: own["instance"].update({"e-agents": instance_to_document(INSTANCE)["e-agents"]})
-    )
+    ours = heading(lambda own: own["instance"].update({"e-agents": instance_to_document(INSTANCE)["e-agents"]}))
     found = outcome(rebuilt((tmp_path / "b.mcap").read_bytes(), ours), tmp_path / "c.mcap")
     assert "command_speed of agent" in str(found)
 

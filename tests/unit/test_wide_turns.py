@@ -103,9 +103,7 @@ def test_roads_that_are_too_tight_are_refused_with_the_place(parts: dict[str, An
 @pytest.mark.parametrize("controller", ["simple", "lanes"])
 def test_cars_that_never_stop_drive_where_no_rules_are_asked_for(controller: str, tmp_path: Path) -> None:
     agents = [{"type": "wander", "name": "one"}, {"type": "loop", "name": "two"}]
-    made = suburb(
-        **{"rules": False, "e-agents": agents, "bounds": {"speed_min": 0.3}, "end_on_collision": True}
-    )
+    made = suburb(**{"rules": False, "e-agents": agents, "bounds": {"speed_min": 0.3}, "end_on_collision": True})
     ending = run_trial(draw(made, SEED, 1), controller, record=tmp_path / "a.mcap").ending
     frames = read(tmp_path / "a.mcap").frames
     assert ending.ticks > 60

@@ -45,9 +45,7 @@ class Orca:
             velocity = _velocity(which, twist)
             simulator.set_agent_velocity(number, velocity)
             simulator.set_agent_pref_velocity(number, velocity)
-        simulator.set_agent_pref_velocity(
-            0, along_lane(self._navigator.look(observation), pose, self._bounds)
-        )
+        simulator.set_agent_pref_velocity(0, along_lane(self._navigator.look(observation), pose, self._bounds))
         simulator.do_step()
         found = simulator.get_agent_velocity(0)
         return toward(pose, self._bounds, found.x, found.y)

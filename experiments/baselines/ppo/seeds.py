@@ -41,9 +41,7 @@ def of_seed(seed: int, file: Path) -> dict[str, Any]:
 
 def median(known: list[dict[str, Any]]) -> int:
     """Return the place of the median seed."""
-    by = [
-        (own["shield"]["counted_rounds"], own["shield"]["rounds_before_breach"], own["seed"]) for own in known
-    ]
+    by = [(own["shield"]["counted_rounds"], own["shield"]["rounds_before_breach"], own["seed"]) for own in known]
     return sorted(range(len(by)), key=by.__getitem__)[len(by) // 2]
 
 

@@ -121,9 +121,7 @@ def environments(*, shielded: bool) -> TrafficVectorEnv | Shielded:
     """Return the environments to learn in."""
     given: dict[str, Any] = {"action": "discrete", "frame_skip": SKIP, "cars": CARS, "levels": Levels(LEVELS)}
     if shielded:
-        own = TrafficParallelVectorEnv(
-            ENVS, CONFIG, learned=[], shields={"ego_0": "sure"}, excuses=False, **given
-        )
+        own = TrafficParallelVectorEnv(ENVS, CONFIG, learned=[], shields={"ego_0": "sure"}, excuses=False, **given)
         return Shielded(own)
     return TrafficVectorEnv(ENVS, CONFIG, autoreset_mode="SameStep", **given)
 
@@ -141,8 +139,7 @@ def train(seed: int, steps: int, *, lagrangian: bool, shielded: bool) -> Policy:
     parts = [*model.policy.mlp_extractor.policy_net, model.policy.action_net]
     layers = [part for part in parts if isinstance(part, torch.nn.Linear)]
     kept = tuple(
-        (own.weight.detach().numpy().astype(np.float64), own.bias.detach().numpy().astype(np.float64))
-        for own in layers
+        (own.weight.detach().numpy().astype(np.float64), own.bias.detach().numpy().astype(np.float64)) for own in layers
     )
     return Policy(tuple(env.settings.layout.names), CARS, SKIP, kept, CHOICES)
 

@@ -106,38 +106,38 @@ def drawn(dice: np.random.Generator, legs: int, share: float = 0.3) -> Floats:
 
 def mutated(dice: np.random.Generator, table: Floats) -> Floats:
     """Return a table that differs in one number: moved a little, chosen anew, or left to the law."""
-    own = table.copy()
-    leg, column = int(dice.integers(len(own))), int(dice.integers(CHOICES))
-    chosen = np.isfinite(own).ravel().nonzero()[0]
+    changed = table.copy()
+    leg, column = int(dice.integers(len(changed))), int(dice.integers(CHOICES))
+    chosen = np.isfinite(changed).ravel().nonzero()[0]
     move = dice.random()
     if len(chosen) and move < 0.7:
         leg, column = divmod(int(chosen[dice.integers(len(chosen))]), CHOICES)
     low, high = BOUNDS[column].tolist()
-    value = float(own[leg, column])
+    value = float(changed[leg, column])
     if isfinite(value) and move < 0.2:
-        own[leg, column] = np.nan
+        changed[leg, column] = np.nan
     elif column == CHOICE.EXIT:
-        own[leg, column] = dice.integers(0, EXITS)
+        changed[leg, column] = dice.integers(0, EXITS)
     elif isfinite(value) and move < 0.5:
         far = STEP * 10.0 ** (-2.0 * dice.random()) * (high - low)
         moved = value + far * dice.standard_normal()
-        own[leg, column] = min(max(moved, low), high)
+        changed[leg, column] = min(max(moved, low), high)
     else:
-        own[leg, column] = low + (high - low) * dice.random()
-    return own
+        changed[leg, column] = low + (high - low) * dice.random()
+    return changed
 
 
 def reductions(table: Floats) -> Iterator[Floats]:
     """Yield smaller tables: first those without the choices of one leg, then those without one number."""
     chosen = np.isfinite(table)
     for leg in np.flatnonzero(chosen.sum(axis=1) > 1).tolist():
-        own = table.copy()
-        own[leg] = np.nan
-        yield own
+        changed = table.copy()
+        changed[leg] = np.nan
+        yield changed
     for leg, column in np.argwhere(chosen).tolist():
-        own = table.copy()
-        own[leg, column] = np.nan
-        yield own
+        changed = table.copy()
+        changed[leg, column] = np.nan
+        yield changed
 
 
 def cut(table: Floats, speed: float, problem: Problem) -> Floats:
@@ -159,21 +159,21 @@ def cut(table: Floats, speed: float, problem: Problem) -> Floats:
     """
     rules = RuleParameters.from_mapping(problem.rules)
     fastest = problem.car.bounds.speed
-    own = table.copy()
+    short = table.copy()
     crawl = SLOWEST * rules.linger_distance / max(rules.linger_time, problem.period)
     slowest = min(max(crawl, fastest / max(rules.journey_lengths, 1.0)), fastest)
-    own[:, CHOICE.SPEED] = np.clip(own[:, CHOICE.SPEED] * fastest, slowest, fastest)
+    short[:, CHOICE.SPEED] = np.clip(short[:, CHOICE.SPEED] * fastest, slowest, fastest)
     hold = rules.enter_time if rules.tickets > 0 else min(rules.enter_time, rules.forfeit_time)
-    own[:, CHOICE.HOLD] = np.clip(own[:, CHOICE.HOLD], 0.0, SHARE * hold)
+    short[:, CHOICE.HOLD] = np.clip(short[:, CHOICE.HOLD], 0.0, SHARE * hold)
     rest = SHARE * rules.rest_time - rules.journey_start_time
-    own[:, CHOICE.PAUSE] = np.clip(own[:, CHOICE.PAUSE], 0.0, max(rest, 0.0))
-    through = np.where(np.isfinite(own[:, CHOICE.SPEED]), own[:, CHOICE.SPEED], speed)
+    short[:, CHOICE.PAUSE] = np.clip(short[:, CHOICE.PAUSE], 0.0, max(rest, 0.0))
+    through = np.where(np.isfinite(short[:, CHOICE.SPEED]), short[:, CHOICE.SPEED], speed)
     through = np.minimum(np.maximum(through, through_speed(problem)), fastest)
     longest = LONGEST_WAY * (problem.intersection_radius + problem.car.body.reach)
     spare = np.maximum(SHARE * (rules.exit_time - longest / through), 0.0)
-    own[:, CHOICE.DWELL] = np.clip(own[:, CHOICE.DWELL], 0.0, spare)
-    own[:, CHOICE.GAP] = np.clip(own[:, CHOICE.GAP], LEAST_GAP, MOST_GAP)
-    return own
+    short[:, CHOICE.DWELL] = np.clip(short[:, CHOICE.DWELL], 0.0, spare)
+    short[:, CHOICE.GAP] = np.clip(short[:, CHOICE.GAP], LEAST_GAP, MOST_GAP)
+    return short
 
 
 def with_choices(

@@ -33,9 +33,7 @@ BACK = -0.99
 
 
 @jit
-def drive(
-    b: int, n: int, tick: int, pose: Pose, seen: bool, weary: bool, scene: Scene
-) -> tuple[float, float]:
+def drive(b: int, n: int, tick: int, pose: Pose, seen: bool, weary: bool, scene: Scene) -> tuple[float, float]:
     """Return (speed, yaw rate) toward the waypoint of car n, which is set anew when the car has reached it.
 
     `seen` (bool): the ego is seen and to be followed; `weary` (bool): the car's patience has ended and something is in
@@ -118,9 +116,7 @@ def _beside(lane: int, along: float, net: int, offset: float, roads: RoadTable) 
 
 
 @jit
-def _ahead(
-    pose: Pose, far: float, lane: int, net: int, offset: float, roads: RoadTable
-) -> tuple[float, float]:
+def _ahead(pose: Pose, far: float, lane: int, net: int, offset: float, roads: RoadTable) -> tuple[float, float]:
     """Return the point `offset` (m) right of a lane's road that is `far` (m) ahead of a car along it."""
     along, _, _, _, _ = foot(roads, net, lane, pose.x, pose.y)
     return _beside(lane, along + far, net, offset, roads)

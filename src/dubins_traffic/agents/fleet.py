@@ -142,7 +142,7 @@ def pack_agents(instances: Sequence[Instance], cars: int, net: Ints) -> Agents:
     elsewhere = KEEP_RULES | ALONE
     fleets, whose = distinct([id(instance.e_agents) for instance in instances])
     kinds = [{agent.driver.kind for agent in instances[b].e_agents} for b in fleets]
-    driven = np.array([not own <= elsewhere for own in kinds])[whose]
+    driven = np.array([not kind <= elsewhere for kind in kinds])[whose]
     for b in np.flatnonzero(driven).tolist():
         instance = instances[b]
         for n, agent in enumerate(instance.e_agents, start=1):
@@ -207,11 +207,14 @@ def _recalled(instances: Sequence[Instance], agents: Rows[Agent]) -> Floats:
     """Fill in delay and noise of the cars that are nudged; return `Agents.recalled`."""
     count = longest = 0
     for b, instance in enumerate(instances):
-        for n, own in enumerate(instance.e_agents, start=1):
-            if own.kind == NUDGED:
+        for n, e_agent in enumerate(instance.e_agents, start=1):
+            if e_agent.kind == NUDGED:
                 agent = agents[b, n]
-                agent.recall, agent.delay = count, own.parameters["delay"]
-                agent.noise, agent.fastest = own.parameters["speed_noise"], instance.problem.car.bounds.speed
+                agent.recall, agent.delay = count, e_agent.parameters["delay"]
+                agent.noise, agent.fastest = (
+                    e_agent.parameters["speed_noise"],
+                    instance.problem.car.bounds.speed,
+                )
                 count, longest = count + 1, max(longest, agent.delay)
     return np.zeros((count, longest + 1, 2))
 

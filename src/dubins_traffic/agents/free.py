@@ -149,9 +149,7 @@ class Free(Tables):
 
 
 @jit_rare
-def decide_free(
-    b: int, tick: int, commands: Floats, drivers: Drivers, judging: RefereeTables, free: Free
-) -> None:
+def decide_free(b: int, tick: int, commands: Floats, drivers: Drivers, judging: RefereeTables, free: Free) -> None:
     """Replace the commands of the free cars of trial b, which are those of the law, by what they like and may do.
 
     `drivers` has the trial's seed; frame `tick` has been labelled and judged.
@@ -170,83 +168,81 @@ def decide_free(
 
 
 @jit
-def _like(
-    b: int, n: int, tick: int, commands: Floats, drivers: Drivers, judging: RefereeTables, free: Free
-) -> None:
+def _like(b: int, n: int, tick: int, commands: Floats, drivers: Drivers, judging: RefereeTables, free: Free) -> None:
     """Replace the command of car n, which is the law's, by what it likes to do, as far as its clocks allow that."""
-    own = free.car[int(free.row[b, n])]
-    if own.first < own.last:
-        _play(tick, own, free.whim)
-    elif tick >= own.until:
-        _think(b, n, tick, own, drivers)
-    owes = _owes(b, n, tick, own, judging)
-    if _holds(b, n, tick, own, drivers, judging):
+    car = free.car[int(free.row[b, n])]
+    if car.first < car.last:
+        _play(tick, car, free.whim)
+    elif tick >= car.until:
+        _think(b, n, tick, car, drivers)
+    owes = _owes(b, n, tick, car, judging)
+    if _holds(b, n, tick, car, drivers, judging):
         commands[b, n, 0] = commands[b, n, 1] = 0.0
-    elif not owes and own.share >= 0.0:
-        commands[b, n, 0] *= own.share
-        commands[b, n, 1] *= own.share
-    elif not owes and _may(b, n, own, judging, free):
-        commands[b, n, 0], commands[b, n, 1] = own.speed, own.yaw_rate
+    elif not owes and car.share >= 0.0:
+        commands[b, n, 0] *= car.share
+        commands[b, n, 1] *= car.share
+    elif not owes and _may(b, n, car, judging, free):
+        commands[b, n, 0], commands[b, n, 1] = car.speed, car.yaw_rate
 
 
 @jit
-def _play(tick: int, own: FreeCar, whims: Rows[Whim]) -> None:
+def _play(tick: int, car: FreeCar, whims: Rows[Whim]) -> None:
     """Set the present whim to that which is given for a tick; after the last one the law drives."""
-    total = int(whims[own.last - 1].end)
-    if total == 0 or (tick >= total and own.repeat == 0):
-        own.share, own.patience = AS_THE_LAW, 0.0
+    total = int(whims[car.last - 1].end)
+    if total == 0 or (tick >= total and car.repeat == 0):
+        car.share, car.patience = AS_THE_LAW, 0.0
         return
     now = tick % total
-    row = own.place
-    if row < own.first or (row > own.first and whims[row - 1].end > now):
-        row = own.first
+    row = car.place
+    if row < car.first or (row > car.first and whims[row - 1].end > now):
+        row = car.first
     while whims[row].end <= now:
         row += 1
-    own.place = row
-    own.share, own.speed, own.yaw_rate = whims[row].share, whims[row].speed, whims[row].yaw_rate
-    own.patience = whims[row].hold
+    car.place = row
+    car.share, car.speed, car.yaw_rate = whims[row].share, whims[row].speed, whims[row].yaw_rate
+    car.patience = whims[row].hold
 
 
 @jit_rare
-def _think(b: int, n: int, tick: int, own: FreeCar, drivers: Drivers) -> None:
+def _think(b: int, n: int, tick: int, car: FreeCar, drivers: Drivers) -> None:
     """Draw the next whim."""
     seed, trial = drivers.seed[b], drivers.trial[b]
     seconds = SHORT + (LONG - SHORT) * uniform(seed, trial, n, tick, DRAW.FREE)
-    own.until = tick + max(1, int(seconds * own.rate))
-    own.share = AS_THE_LAW
-    if uniform(seed, trial, n, tick, DRAW.FREE + 1) >= own.boldness:
+    car.until = tick + max(1, int(seconds * car.rate))
+    car.share = AS_THE_LAW
+    if uniform(seed, trial, n, tick, DRAW.FREE + 1) >= car.boldness:
         return
-    kind = int((6.0 if own.turns != 0 else 4.0) * uniform(seed, trial, n, tick, DRAW.FREE + 2))
+    kind = int((6.0 if car.turns != 0 else 4.0) * uniform(seed, trial, n, tick, DRAW.FREE + 2))
     share = uniform(seed, trial, n, tick, DRAW.FREE + 3)
     if kind == 0:
-        own.share = share
+        car.share = share
         return
-    turn = (2.0 * uniform(seed, trial, n, tick, DRAW.FREE + 4) - 1.0) * own.yaw_most
-    own.share, own.speed, own.yaw_rate = NOTHING_GIVEN, 0.0, 0.0
+    turn = (2.0 * uniform(seed, trial, n, tick, DRAW.FREE + 4) - 1.0) * car.yaw_most
+    car.share, car.speed, car.yaw_rate = NOTHING_GIVEN, 0.0, 0.0
     if kind == 2:
-        own.speed = -share * own.fastest
+        car.speed = -share * car.fastest
     elif kind == 3:
-        own.speed = share * own.fastest
+        car.speed = share * car.fastest
     elif kind == 4:
-        own.speed = (2.0 * uniform(seed, trial, n, tick, DRAW.FREE + 5) - 1.0) * own.fastest
-        own.yaw_rate = turn * share
+        car.speed = (2.0 * uniform(seed, trial, n, tick, DRAW.FREE + 5) - 1.0) * car.fastest
+        car.yaw_rate = turn * share
     elif kind == 5:
-        own.yaw_rate = turn
+        car.yaw_rate = turn
 
 
 @jit
-def _may(b: int, n: int, own: FreeCar, judging: RefereeTables, free: Free) -> bool:
+def _may(b: int, n: int, car: FreeCar, judging: RefereeTables, free: Free) -> bool:
     """Tell whether a car may do what it likes: it stays apart from others, and along its lane unless it turns.
 
     In a disc it only stands, since from elsewhere than its way the law might not leave the disc in time (E4).
     """
     state, labels, roads, rules = judging.state, judging.labels, judging.roads, judging.rules[b]
     x, y, c, s = state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n]
-    if own.speed == 0.0 and own.yaw_rate == 0.0:
+    if car.speed == 0.0 and car.yaw_rate == 0.0:
         return True
-    if labels.at[b, n] >= 0 or (own.speed < 0.0 and _backs_in(b, n, own, judging)):
+    if labels.at[b, n] >= 0 or (car.speed < 0.0 and _backs_in(b, n, car, judging)):
         return False
-    if own.turns == 0 and own.speed != 0.0:
+    if car.turns == 0 and car.speed != 0.0:
         lane = labels.lane[b, n]
         segment = roads.segment[int(roads.seg_off[rules.net]) + int(labels.segment[b, n])]
         if lane < 0 or segment.piece >= 0:
@@ -257,76 +253,76 @@ def _may(b: int, n: int, own: FreeCar, judging: RefereeTables, free: Free) -> bo
             return False
     for k in range(state.count[b]):
         dx, dy = state.x[b, k] - x, state.y[b, k] - y
-        if (dx * c + dy * s) * own.speed > 0.0 and dx * dx + dy * dy < own.apart * own.apart:
+        if (dx * c + dy * s) * car.speed > 0.0 and dx * dx + dy * dy < car.apart * car.apart:
             return False
     f, obstacles = int(free.row[b, n]), free.traffic.obstacles
     for p in range(obstacles.off[f], obstacles.off[f + 1]):
         part = obstacles.parts[p]
-        dx, dy, far = part.x - x, part.y - y, part.reach + own.apart
-        if (dx * c + dy * s) * own.speed > 0.0 and dx * dx + dy * dy < far * far:
+        dx, dy, far = part.x - x, part.y - y, part.reach + car.apart
+        if (dx * c + dy * s) * car.speed > 0.0 and dx * dx + dy * dy < far * far:
             return False
     return True
 
 
 @jit
-def _backs_in(b: int, n: int, own: FreeCar, judging: RefereeTables) -> bool:
+def _backs_in(b: int, n: int, car: FreeCar, judging: RefereeTables) -> bool:
     """Tell whether a car that backs up brings its centre into the disc from which it came."""
     roads, rules, lane = judging.roads, judging.rules[b], judging.labels.lane[b, n]
     if lane < 0:
         return True
     corner = roads.vertex[int(roads.vert_off[rules.net]) + lane_start(roads, rules.net, lane)]
     dx, dy = judging.state.x[b, n] - corner.x, judging.state.y[b, n] - corner.y
-    far = rules.radius - own.speed / own.rate
+    far = rules.radius - car.speed / car.rate
     return bool(dx * dx + dy * dy < far * far)
 
 
 @jit
-def _owes(b: int, n: int, tick: int, own: FreeCar, judging: RefereeTables) -> bool:
+def _owes(b: int, n: int, tick: int, free_car: FreeCar, judging: RefereeTables) -> bool:
     """Tell whether the law has to drive a car now, so that it keeps E3 to E6."""
     labels, log, terms = judging.labels, judging.log, judging.terms[b]
     car = log.car[b, n]
     lane, bits = labels.lane[b, n], np.int64(labels.bits[b, n])
     stopped = bits & FLAG.STOPPED != 0
     if stopped:
-        own.stopped_in = lane
-    elif own.stopped_in != lane:
-        own.stopped_in = -1
+        free_car.stopped_in = lane
+    elif free_car.stopped_in != lane:
+        free_car.stopped_in = -1
     run = tick - car.exit_since - car.exit_paused if car.exit_since >= 0 else 0
-    found = labels.crosses[b, n] >= 0 and car.exit_spent + run >= own.stay
-    found = found or min(tick - car.journey_since, own.start) + car.journey_spent >= own.journey
-    found = found or own.stopped_in >= 0 or bits & FLAG.LEFT != 0
+    found = labels.crosses[b, n] >= 0 and car.exit_spent + run >= free_car.stay
+    found = found or min(tick - car.journey_since, free_car.start) + car.journey_spent >= free_car.journey
+    found = found or free_car.stopped_in >= 0 or bits & FLAG.LEFT != 0
     for g in range(terms.goals_begin, terms.goals_end):
         goal = log.goal[g]
         found = found or labels.at[b, n] == goal.vertex
-        if 0 <= goal.since <= tick - own.crowded:
+        if 0 <= goal.since <= tick - free_car.crowded:
             corner = judging.roads.vertex[int(judging.roads.vert_off[judging.rules[b].net]) + goal.vertex]
             dx, dy = judging.state.x[b, n] - corner.x, judging.state.y[b, n] - corner.y
-            found = found or dx * dx + dy * dy < own.near * own.near
+            found = found or dx * dx + dy * dy < free_car.near * free_car.near
     return found
 
 
 @jit
-def _holds(b: int, n: int, tick: int, own: FreeCar, drivers: Drivers, judging: RefereeTables) -> bool:
+def _holds(b: int, n: int, tick: int, car: FreeCar, drivers: Drivers, judging: RefereeTables) -> bool:
     """Tell whether a car holds at its line, where it is its turn."""
     bits = np.int64(judging.labels.bits[b, n])
     if bits & FLAG.STOPPED == 0:
-        own.hold = -1
+        car.hold = -1
         return False
-    if own.hold < 0:
-        own.hold = int(own.wait * _patience(b, n, tick, own, drivers))
+    if car.hold < 0:
+        car.hold = int(car.wait * _patience(b, n, tick, car, drivers))
     since = judging.log.car[b, n].first_since
     if bits & GOES_NOW != GOES_NOW or bits & FLAG.FORFEITED != 0 or since < 0:
         return False
-    return tick - since < own.hold
+    return tick - since < car.hold
 
 
 @jit_rare
-def _patience(b: int, n: int, tick: int, own: FreeCar, drivers: Drivers) -> float:
+def _patience(b: int, n: int, tick: int, car: FreeCar, drivers: Drivers) -> float:
     """Return for which share of the time that it may a car holds at the next line, as given or drawn."""
-    if own.patience >= 0.0:
-        return own.patience
+    if car.patience >= 0.0:
+        return car.patience
     seed, trial = drivers.seed[b], drivers.trial[b]
-    bold = uniform(seed, trial, n, tick, DRAW.FREE + 6) < own.boldness
+    bold = uniform(seed, trial, n, tick, DRAW.FREE + 6) < car.boldness
     return uniform(seed, trial, n, tick, DRAW.FREE + 7) if bold else 0.0
 
 
@@ -337,37 +333,35 @@ def free_tables(instances: Sequence[Instance], cars: int, roads: RoadTable, net:
     """
     found = [
         (b, n)
-        for b, own in enumerate(instances)
-        for n, agent in enumerate(own.e_agents, start=1)
+        for b, instance in enumerate(instances)
+        for n, agent in enumerate(instance.e_agents, start=1)
         if agent.kind == FREE
     ]
     row = np.full((len(instances), cars), -1)
     for f, place in enumerate(found):
         row[place] = f
-    own = [instances[b] for b, _ in found] or list(instances[:1])
-    problems = [instance.problem for instance in own]
+    free_instances = [instances[b] for b, _ in found] or list(instances[:1])
+    problems = [instance.problem for instance in free_instances]
     nets = np.array([net[b] for b, _ in found] or [net[0]])
     bodies = pack_obstacles([problem.obstacles for problem in problems])
-    shielded = table(Driver, (len(own), cars))
+    shielded = table(Driver, (len(free_instances), cars))
     shielded["kind"][:, EGO] = KIND.ROUND
     shielded["speed"][:, EGO] = [problem.car.bounds.speed for problem in problems]
     traffic = Traffic(
-        State.zeros(len(own), cars),
-        Labels.zeros(len(own), cars),
+        State.zeros(len(free_instances), cars),
+        Labels.zeros(len(free_instances), cars),
         roads,
         bodies,
-        drivers_of(own, nets, shielded, np.zeros(0, dtype=np.int64), np.zeros((0, 0))),
+        drivers_of(free_instances, nets, shielded, np.zeros(0, dtype=np.int64), np.zeros((0, 0))),
         scratch(cars, int(np.diff(roads.seg_off).max()), bodies),
     )
-    rows, whims = table(FreeCar, len(own)), list[tuple[float, ...]]()
+    rows, whims = table(FreeCar, len(free_instances)), list[tuple[float, ...]]()
     for f, (b, n) in enumerate(found):
         _describe(instances[b], instances[b].e_agents[n - 1], rows[f], whims)
     given = table(Whim, len(whims))
-    for name, values in zip(
-        ("end", "share", "speed", "yaw_rate", "hold"), zip(*whims, strict=True), strict=False
-    ):
+    for name, values in zip(("end", "share", "speed", "yaw_rate", "hold"), zip(*whims, strict=True), strict=False):
         given[name] = values
-    return Free(row, rows, given, traffic, shield_tables(problems, traffic), np.zeros((len(own), cars, 2)))
+    return Free(row, rows, given, traffic, shield_tables(problems, traffic), np.zeros((len(free_instances), cars, 2)))
 
 
 def _describe(instance: Instance, agent: EAgent, car: FreeCar, whims: list[tuple[float, ...]]) -> None:
@@ -389,8 +383,7 @@ def _describe(instance: Instance, agent: EAgent, car: FreeCar, whims: list[tuple
     longest_turn = rules.enter_time if rules.tickets > 0 else min(rules.enter_time, rules.forfeit_time)
     car.wait = math.floor(WAIT * longest_turn * rate)
     rows: Sequence[Sequence[float]] = given["whims"] or [
-        (seconds, NOTHING_GIVEN, speed, yaw_rate, NOTHING_GIVEN)
-        for seconds, speed, yaw_rate in given["commands"]
+        (seconds, NOTHING_GIVEN, speed, yaw_rate, NOTHING_GIVEN) for seconds, speed, yaw_rate in given["commands"]
     ]
     car.first = car.place = len(whims)
     whims += script_rows(rows, rate)
@@ -409,9 +402,9 @@ class FreeCars:
     """
 
     def __init__(self, instances: Sequence[Instance], cars: int, roads: RoadTable, net: Ints) -> None:
-        judged = [replace(own, problem=_judged(own.problem)) for own in instances]
+        judged = [replace(instance, problem=_judged(instance.problem)) for instance in instances]
         self._trials = [
-            b for b, own in enumerate(instances) if any(agent.kind == FREE for agent in own.e_agents)
+            b for b, instance in enumerate(instances) if any(agent.kind == FREE for agent in instance.e_agents)
         ]
         self._referee = Referee(judged)
         self._free = free_tables(instances, cars, roads, net)

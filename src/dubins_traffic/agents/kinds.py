@@ -117,7 +117,7 @@ PACKS: dict[str, Pack] = {
 """The function that completes the row of a car, by kind."""
 
 
-def fill(instance: Instance, own: EAgent, agent: Agent, lists: Lists) -> None:
+def fill(instance: Instance, planned: EAgent, agent: Agent, lists: Lists) -> None:
     """Fill the row of an e-agent: how it drives, turns and keeps away from others, and what its kind says.
 
     Raises
@@ -125,9 +125,9 @@ def fill(instance: Instance, own: EAgent, agent: Agent, lists: Lists) -> None:
     InputError
         If there is no such kind here.
     """
-    if own.kind not in PACKS:
-        raise InputError("unknown kind of e-agent", field="kind", value=own.kind, expected=" or ".join(PACKS))
-    given = {**_defaults("wander"), **_defaults(own.kind), **own.parameters}
+    if planned.kind not in PACKS:
+        raise InputError("unknown kind of e-agent", field="kind", value=planned.kind, expected=" or ".join(PACKS))
+    given = {**_defaults("wander"), **_defaults(planned.kind), **planned.parameters}
     car, rate, patience = instance.problem.car, instance.problem.rate, given["patience"]
     speed = max(min(given["speed"], car.bounds.speed), car.bounds.speed_low)
     cosine, sine = sincos(min(given["bearing_tolerance"], WIDEST))
@@ -143,7 +143,7 @@ def fill(instance: Instance, own: EAgent, agent: Agent, lists: Lists) -> None:
     agent.stop = stop
     agent.speed = speed
     agent.yaw_rate = min(given["yaw_rate"], car.bounds.yaw_rate)
-    PACKS[own.kind](instance, given, agent, lists)
+    PACKS[planned.kind](instance, given, agent, lists)
 
 
 @cache

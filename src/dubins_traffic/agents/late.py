@@ -99,7 +99,7 @@ def foresee(tick: int, outlook: Outlook, state: State, labels: Labels, seen: For
     """
     seed, trial, position, heading, period, patience = outlook
     delay = seen.under_way.shape[1]
-    own, told = seen.state, seen.labels
+    seen_state, told = seen.state, seen.labels
     for n in range(state.count[0]):
         pose = Pose(state.x[0, n], state.y[0, n], state.c[0, n], state.s[0, n])
         if position > 0.0 or heading > 0.0:
@@ -114,8 +114,8 @@ def foresee(tick: int, outlook: Outlook, state: State, labels: Labels, seen: For
             bits, seen.first_since[n], seen.clear_since[n] = settle(
                 bits, tick, seen.first_since[n], seen.clear_since[n], patience
             )
-        own.x[0, n], own.y[0, n], own.c[0, n], own.s[0, n] = x, y, c, s
-        own.speed[0, n], own.yaw_rate[0, n] = speed, yaw_rate
+        seen_state.x[0, n], seen_state.y[0, n], seen_state.c[0, n], seen_state.s[0, n] = x, y, c, s
+        seen_state.speed[0, n], seen_state.yaw_rate[0, n] = speed, yaw_rate
         told.segment[0, n], told.at[0, n] = labels.segment[0, n], labels.at[0, n]
         told.crosses[0, n], told.lane[0, n] = labels.crosses[0, n], labels.lane[0, n]
         told.bits[0, n] = bits

@@ -96,19 +96,19 @@ def pack_drivers(
     rounds
         What `routing.rounds.stages` returns for each trial whose ego keeps the rules; by default no ego does.
     """
-    fleets, whose = distinct([(id(own.e_agents), id(own.problem.car)) for own in instances])
+    fleets, whose = distinct([(id(instance.e_agents), id(instance.problem.car)) for instance in instances])
     rows = [_fleet(instances[b], cars) for b in fleets]
-    drivers: Rows[Driver] = stack([own.cars for own in rows])[whose]
+    drivers: Rows[Driver] = stack([row.cars for row in rows])[whose]
     first = 0
-    for b, (own, _) in enumerate(rounds):
-        if len(own):
+    for b, (stages, _) in enumerate(rounds):
+        if len(stages):
             ego = drivers[b, EGO]
-            ego.kind, ego.first, ego.last = KIND.ROUND, first, first + len(own)
+            ego.kind, ego.first, ego.last = KIND.ROUND, first, first + len(stages)
             ego.speed = instances[b].problem.car.bounds.speed
-            first += len(own)
+            first += len(stages)
     stage: list[int] = []
-    for own, _ in rounds:
-        stage += own.tolist()
+    for stages, _ in rounds:
+        stage += stages.tolist()
     distance = _one_below_another([far for _, far in rounds])
     _add_stages([instance.problem for instance in instances], rows, whose, drivers, stage)
     numbers: list[int] = whose.tolist()
@@ -120,8 +120,8 @@ def _add_choices(tables: Sequence[Mapping[int, Floats]], drivers: Rows[Driver]) 
     """Return the choices of all cars of all trials as one table; fill in which rows are whose."""
     found: list[Floats] = [empty(0)]
     first = 0
-    for b, own in enumerate(tables):
-        for n, rows in own.items():
+    for b, choices in enumerate(tables):
+        for n, rows in choices.items():
             drivers[b, n].choice = first
             first += len(rows)
             found.append(rows)
@@ -181,22 +181,22 @@ class _Fleet(NamedTuple):
 
 
 def _fleet(instance: Instance, cars: int) -> _Fleet:
-    own = _Fleet(table(Driver, cars), [], [], {})
+    fleet = _Fleet(table(Driver, cars), [], [], {})
     for n, given_agent in enumerate(instance.e_agents, start=1):
         agent = given_agent.driver
         if agent.kind in KEEP_RULES:
             given = {**_defaults(agent.kind), **agent.parameters}
-            _describe(agent.kind, given, instance.problem.car.bounds.speed, own.cars[n])
-            own.cars[n].whims = given_agent.kind == FREE
+            _describe(agent.kind, given, instance.problem.car.bounds.speed, fleet.cars[n])
+            fleet.cars[n].whims = given_agent.kind == FREE
             rows = given.get("choices", ())
             if rows:
-                own.choice[n] = cut(from_rows(rows), own.cars[n].speed, instance.problem)
-                own.cars[n].choices = len(own.choice[n])
-            if own.cars[n].kind == KIND.LOOP:
-                own.loops.append((n, given["cycle"]))
+                fleet.choice[n] = cut(from_rows(rows), fleet.cars[n].speed, instance.problem)
+                fleet.cars[n].choices = len(fleet.choice[n])
+            if fleet.cars[n].kind == KIND.LOOP:
+                fleet.loops.append((n, given["cycle"]))
             else:
-                own.goers.append(n)
-    return own
+                fleet.goers.append(n)
+    return fleet
 
 
 @cache
@@ -226,18 +226,18 @@ def _add_stages(
     numbers: list[int] = whose.tolist()
     goals: list[tuple[int, int]] = []
     for b, (problem, number) in enumerate(zip(problems, numbers, strict=True)):
-        own, first = fleets[number], len(stage)
-        if own.goers or own.loops:
+        fleet, first = fleets[number], len(stage)
+        if fleet.goers or fleet.loops:
             stage += dict.fromkeys(problem.goal_vertices)
         goals.append((first, len(stage)))
-        for n, cycle in own.loops:
+        for n, cycle in fleet.loops:
             cars[b, n].first = len(stage)
             stage += cycle_lanes(problem.network, cycle)
             cars[b, n].last = len(stage)
     spans = np.array(goals, dtype=np.int64)
-    for number, own in enumerate(fleets):
+    for number, fleet in enumerate(fleets):
         trials = np.flatnonzero(whose == number)[:, None]
-        bound_by_e6 = [*own.goers, *(n for n, _ in own.loops)]
+        bound_by_e6 = [*fleet.goers, *(n for n, _ in fleet.loops)]
         for k, (first, own_goals) in enumerate((("first", "goal_first"), ("last", "goal_last"))):
-            cars[first][trials, own.goers] = spans[trials, k]
+            cars[first][trials, fleet.goers] = spans[trials, k]
             cars[own_goals][trials, bound_by_e6] = spans[trials, k]

@@ -70,42 +70,38 @@ class OwnAgents:
             If there are several trials, a class can't be found or made, or takes other parameters.
         """
         if len(instances) != 1:
-            raise InputError(
-                "such e-agents are not batched", field="type", value=OWN, expected="one trial at a time"
-            )
+            raise InputError("such e-agents are not batched", field="type", value=OWN, expected="one trial at a time")
         (instance,) = instances
         self._reports: list[tuple[str, str]] = []
         self._driven = [
-            _begun(instance, car, agent)
-            for car, agent in enumerate(instance.e_agents, start=1)
-            if agent.kind == OWN
+            _begun(instance, car, agent) for car, agent in enumerate(instance.e_agents, start=1) if agent.kind == OWN
         ]
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:
         """Write the commands of these cars for [t_k, t_k+1) into `commands` (1, N, 2)."""
-        for own in self._driven:
-            commands[0, own.car] = self._command(own, own.senses.observe(tick, state, labels))
+        for driven in self._driven:
+            commands[0, driven.car] = self._command(driven, driven.senses.observe(tick, state, labels))
 
     def report(self) -> Sequence[tuple[str, str]]:
         """Return what drivers have raised since the last call."""
-        found, self._reports = self._reports, []
-        return found
+        reports, self._reports = self._reports, []
+        return reports
 
     def reseed(self, seed: int) -> None:
         """Let what is drawn from now on follow from another seed, where a class has a method `reseed` for that."""
-        for own in self._driven:
-            if isinstance(own.driver, Draws):
-                own.driver.reseed(seed)
+        for driven in self._driven:
+            if isinstance(driven.driver, Draws):
+                driven.driver.reseed(seed)
 
-    def _command(self, own: _Driven, observation: Observation) -> tuple[float, float]:
-        if own.has_raised:
+    def _command(self, driven: _Driven, observation: Observation) -> tuple[float, float]:
+        if driven.has_raised:
             return math.nan, math.nan
         try:
-            speed, yaw_rate = own.driver.act(observation)
+            speed, yaw_rate = driven.driver.act(observation)
             return float(speed), float(yaw_rate)
         except Exception as error:
-            own.has_raised = True
-            self._reports.append((FAULT, f"{own.name} raised {outside.plainly(error)}"))
+            driven.has_raised = True
+            self._reports.append((FAULT, f"{driven.name} raised {outside.plainly(error)}"))
             return math.nan, math.nan
 
 

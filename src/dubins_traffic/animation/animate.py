@@ -105,9 +105,7 @@ class Animation:
     ) -> None:
         frames = record.frames
         if len(frames) == 0:
-            raise InputError(
-                "nothing to show", file=record.file, field="frames", value=0, expected="at least one"
-            )
+            raise InputError("nothing to show", file=record.file, field="frames", value=0, expected="at least one")
         _require_within("--fps", fps, 0.1, MOST_FPS)
         _require_within("--speed", speed, 0.01, 1000.0)
         _require_within("--size", size, *SIZES)
@@ -116,23 +114,17 @@ class Animation:
         for name, second in (("--from", begin), ("--to", end)):
             if not first <= second <= last:
                 expected = f"a second of the trial, {first:g} to {last:.7g}"
-                raise InputError(
-                    "outside the trial", file=record.file, field=name, value=second, expected=expected
-                )
+                raise InputError("outside the trial", file=record.file, field=name, value=second, expected=expected)
         if end < begin:
             raise InputError("before --from", field="--to", value=end, expected=f"at least {begin:g}")
         count = math.floor((end - begin) * fps / speed + 1e-9) + 1
         if count > MOST_PICTURES:
-            expected = (
-                f"at most {MOST_PICTURES} pictures; --speed, --fps, --from and --to change their number"
-            )
+            expected = f"at most {MOST_PICTURES} pictures; --speed, --fps, --from and --to change their number"
             raise InputError("too many pictures", field="pictures", value=count, expected=expected)
         self.fps = fps
         self._frames, self._problem = frames, record.instance.problem
         self._seconds = begin + np.arange(count) * (speed / fps)
-        self._numbers = np.minimum(
-            np.round(self._seconds * frames.rate).astype(int) - frames.first, len(frames) - 1
-        )
+        self._numbers = np.minimum(np.round(self._seconds * frames.rate).astype(int) - frames.first, len(frames) - 1)
         self._shape = picture_size(self._problem, size)
         self._visits = goal_visits(record.instance, frames)
         self._marks = _all_marks(record, verdict)
@@ -169,9 +161,7 @@ class Animation:
         marks[:, 3] = second - marks[:, 3]
         return marks
 
-    def write(
-        self, path: str | os.PathLike[str], *, overwrite: bool = False, progress: Progress | None = None
-    ) -> None:
+    def write(self, path: str | os.PathLike[str], *, overwrite: bool = False, progress: Progress | None = None) -> None:
         """Write the pictures to a file: GIF, PNG (animated), MP4 or WebM, by its suffix.
 
         Parameters
@@ -210,9 +200,7 @@ class Animation:
         write = write_gif if suffix == ".gif" else write_png
         replace_file(
             target,
-            lambda draft: draft.write_bytes(
-                b"".join(write(pictures(), self._samples(), len(self), self.fps))
-            ),
+            lambda draft: draft.write_bytes(b"".join(write(pictures(), self._samples(), len(self), self.fps))),
         )
 
     def _samples(self) -> list[Image]:

@@ -193,12 +193,8 @@ class Canvas:
         self.draw([*shapes.ways(lines), *shapes.cars(self.car.body, instance.names, starts, ghost=True)])
         self.cars(instance, ends)
         self.things |= self.draw(shapes.signs(marks))
-        start = Line2D(
-            [], [], linestyle="none", marker="o", markerfacecolor="none", markeredgecolor="#555555"
-        )
-        end = Line2D(
-            [], [], linestyle="none", marker="o", markerfacecolor="#555555", markeredgecolor="#222222"
-        )
+        start = Line2D([], [], linestyle="none", marker="o", markerfacecolor="none", markeredgecolor="#555555")
+        end = Line2D([], [], linestyle="none", marker="o", markerfacecolor="#555555", markeredgecolor="#222222")
         self.things |= {"start": start, "end": end}
 
     def finish(self, title: str) -> None:

@@ -56,13 +56,13 @@ class Colours:
     def numbers(self, image: Image) -> Bytes:
         """Return the numbers of the colours nearest to those of a picture, (H, W)."""
         packed = _packed(image)
-        found = self._number[packed]
-        if (found < 0).any():
-            fresh = np.unique(packed[found < 0])
+        number = self._number[packed]
+        if (number < 0).any():
+            fresh = np.unique(packed[number < 0])
             apart = _unpacked(fresh)[:, None].astype(np.int32) - self.rgb[None, : self._count]
             self._number[fresh] = (apart * apart).sum(axis=2).argmin(axis=1)
-            found = self._number[packed]
-        return found.astype(np.uint8)
+            number = self._number[packed]
+        return number.astype(np.uint8)
 
 
 def changes(pictures: Iterator[Image], colours: Colours) -> Iterator[Change]:
@@ -88,10 +88,10 @@ def changes(pictures: Iterator[Image], colours: Colours) -> Iterator[Change]:
         yield Change(int(left), int(top), change, number)
 
 
-def _timed(found: Iterator[Change], total: int) -> Iterator[tuple[Change, int]]:
+def _timed(changes: Iterator[Change], total: int) -> Iterator[tuple[Change, int]]:
     """Return each change with the number of pictures for which it is shown."""
     held: Change | None = None
-    for change in found:
+    for change in changes:
         if held is not None:
             yield held, change.since - held.since
         held = change

@@ -125,10 +125,10 @@ def _draw(subject: Subject | Run) -> Any:
         how = "cut off" if subject.ending is None else subject.ending.end.value.replace("_", " ")
         canvas.finish(f"{_heading(instance)}, {span:.4g} s, end: {how}")
         return canvas.figure
-    own, score = subject.paths or Paths(), subject.score
+    paths, score = subject.paths or Paths(), subject.score
     breaches = () if score.verdict is None else breach_marks(instance, score.verdict.violations)
-    canvas = _ground(instance, own.lines())
-    canvas.trial(instance, own.lines(), instance.starts, own.last or instance.starts, breaches)
+    canvas = _ground(instance, paths.lines())
+    canvas.trial(instance, paths.lines(), instance.starts, paths.last or instance.starts, breaches)
     canvas.names(instance.problem)
     canvas.finish(f"{_heading(instance)}, {score.duration_s:.4g} s, {score.summary}")
     return canvas.figure

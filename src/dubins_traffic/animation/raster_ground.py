@@ -93,9 +93,7 @@ class Cover:
         v = np.abs((y - ay) * cx - (x - ax) * cy)
         inner = u + before - np.floor((u + before) / (on + off)) * (on + off)
         stroke = np.abs(inner - 0.5 * on) - 0.5 * on
-        self._put(
-            rows, columns, np.maximum(np.maximum(stroke, v - half), np.abs(u - 0.5 * length) - 0.5 * length)
-        )
+        self._put(rows, columns, np.maximum(np.maximum(stroke, v - half), np.abs(u - 0.5 * length) - 0.5 * length))
 
     def disc(self, x: float, y: float, radius: float) -> None:
         """Cover a disc."""

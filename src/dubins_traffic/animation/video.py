@@ -48,9 +48,7 @@ class Video:
         self._av = library("av")
         bare = {"fflags": "+bitexact"} | ({"movflags": "+faststart"} if container == "mp4" else {})
         self._file: Any = self._av.open(str(file), "w", format=container, options=bare)
-        self._stream = self._file.add_stream(
-            codec, rate=Fraction(fps).limit_denominator(1000), options=options
-        )
+        self._stream = self._file.add_stream(codec, rate=Fraction(fps).limit_denominator(1000), options=options)
         self._stream.width, self._stream.height = (side // 2 * 2 for side in size)
         self._stream.pix_fmt = "yuv420p"
 

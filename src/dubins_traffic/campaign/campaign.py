@@ -96,12 +96,10 @@ class Campaign:
         metrics : (tuple of str, tuple of Column), optional
             The further metrics and their columns, in place of those that the document names.
         """
-        own = plain(document, file)
-        model = parse(CampaignModel, own, file=file)
+        given = plain(document, file)
+        model = parse(CampaignModel, given, file=file)
         try:
-            configurations = [
-                configuration_of(entry, k, folder) for k, entry in enumerate(model.configurations)
-            ]
+            configurations = [configuration_of(entry, k, folder) for k, entry in enumerate(model.configurations)]
             check_names([entry.name for entry in model.configurations], "configurations")
             check_names([bare_name(spec) for spec in model.controllers], "controllers")
             found = places or tuple(_place(spec, k, folder) for k, spec in enumerate(model.controllers))
@@ -204,16 +202,14 @@ def _place(spec: str, index: int, folder: Path | None) -> str:
 def _metrics(specs: list[str], folder: Path | None) -> tuple[tuple[str, ...], tuple[Column, ...]]:
     """Return the metrics' names, with full paths if they are files, and their columns; each is loaded once."""
     places = tuple(outside.resolved(spec, folder) for spec in specs)
-    found: list[Column] = []
+    columns: list[Column] = []
     for k, place in enumerate(places):
-        taken = [*RESULT, *WALL, *(own.name for own in found)]
+        taken = [*RESULT, *WALL, *(column.name for column in columns)]
         try:
-            found += scores.columns([place], taken)
+            columns += scores.columns([place], taken)
         except InputError as error:
-            raise InputError(
-                error.problem, field=f"metrics[{k}]", value=error.value, expected=error.expected
-            ) from None
-    return places, tuple(found)
+            raise InputError(error.problem, field=f"metrics[{k}]", value=error.value, expected=error.expected) from None
+    return places, tuple(columns)
 
 
 def check_names(names: list[str], what: str) -> None:
@@ -251,9 +247,7 @@ def _check_axes(axes: Mapping[str, list[Any]], model: CampaignModel, configurati
         scalars = [scalar(value) for value in values]
         for k, value in enumerate(scalars):
             if (type(value), value) in [(type(other), other) for other in scalars[:k]]:
-                raise InputError(
-                    "value stands twice", field=f"{field_}[{k}]", value=value, expected="each value once"
-                )
+                raise InputError("value stands twice", field=f"{field_}[{k}]", value=value, expected="each value once")
         count *= len(values)
     if count > MOST_CELLS:
         expected = f"at most {MOST_CELLS} of them with the configurations"

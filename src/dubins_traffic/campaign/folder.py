@@ -207,19 +207,17 @@ def opened(path: Path, campaign: Campaign, *, resume: bool, records: str | None)
             known = manifest.make(campaign, records or Keep.NONE)
             manifest.write(path, campaign, known)
         elif not resume:
-            raise InputError(
-                "holds a campaign", file=str(path), expected="a new folder; --resume goes on with it"
-            )
+            raise InputError("holds a campaign", file=str(path), expected="a new folder; --resume goes on with it")
         else:
             known = manifest.check_same(path, campaign, records)
         keep, sample = read_keep(known["records"])
-        own = None if keep is Keep.NONE else Records(path.resolve(), keep, sample, campaign.total)
-        for name in (PARTS, *(() if own is None else (RECORDS,))):
+        recorded = None if keep is Keep.NONE else Records(path.resolve(), keep, sample, campaign.total)
+        for name in (PARTS, *(() if recorded is None else (RECORDS,))):
             make_folder(path / name, "a campaign")
         for name in (".", PARTS):
             for left in (path / name).glob(".*.tmp"):
                 left.unlink()
-        yield Folder(path, campaign, own)
+        yield Folder(path, campaign, recorded)
 
 
 def _check_empty(folder: Path) -> None:

@@ -88,12 +88,8 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
         "trials": campaign.total,
         "records": records,
         "campaign": _hash(campaign.document),
-        "configurations": {
-            entry["name"]: _hash(entry["document"]) for entry in campaign.document["configurations"]
-        },
-        "controllers": [
-            {"name": name, "place": place, "file": hash_of_file(place)} for name, place in places
-        ],
+        "configurations": {entry["name"]: _hash(entry["document"]) for entry in campaign.document["configurations"]},
+        "controllers": [{"name": name, "place": place, "file": hash_of_file(place)} for name, place in places],
         **({"metrics": metrics, "columns": columns} if metrics else {}),
         "versions": {OURS: package_version(), "python": platform.python_version(), **_versions()},
         "code": sources_hash(),
@@ -187,9 +183,7 @@ def check_same(folder: Path, campaign: Campaign, records: str | None) -> dict[st
     if now["records"] != manifest["records"]:
         raise _changed("--records", None, now["records"], manifest["records"])
     if now["versions"][OURS] != manifest["versions"][OURS]:
-        raise _changed(
-            str(folder / NAME), f"versions.{OURS}", now["versions"][OURS], manifest["versions"][OURS]
-        )
+        raise _changed(str(folder / NAME), f"versions.{OURS}", now["versions"][OURS], manifest["versions"][OURS])
     return manifest
 
 
@@ -198,9 +192,7 @@ _ABSENT = "nothing"
 
 def _changed(file: str | None, field: str | None, now: object, before: object) -> InputError:
     expected = f"{json.dumps(before)[:80]}, or a new folder"
-    return InputError(
-        "changed since the campaign began", file=file, field=field, value=now, expected=expected
-    )
+    return InputError("changed since the campaign began", file=file, field=field, value=now, expected=expected)
 
 
 def _difference(before: Any, now: Any, path: str) -> tuple[str, Any, Any] | None:

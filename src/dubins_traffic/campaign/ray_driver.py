@@ -162,8 +162,8 @@ def run(errand: bytes, paths: tuple[str, ...], wanted: str) -> bytes:
     DubinsTrafficError
         If this node has another version of the package than the one that is wanted.
     """
-    own = version(PACKAGE)
-    if own != wanted:
-        raise DubinsTrafficError(f"a node has {PACKAGE} {own}, not {wanted}")
+    installed = version(PACKAGE)
+    if installed != wanted:
+        raise DubinsTrafficError(f"a node has {PACKAGE} {installed}, not {wanted}")
     sys.path += [path for path in paths if path not in sys.path]
     return pickle.dumps(pickle.loads(errand).run(lambda: False))

@@ -106,5 +106,5 @@ def rows_of(subject: object) -> list[dict[str, Any]]:
 
 def _row(score: Score) -> dict[str, Any]:
     identity = {name: getattr(score, name) for name in ("trial", "seed", "controller", "record", "end")}
-    scores = {name: own.of(score) for name, own in SCORES.items()}
-    return {**identity, **scores, **{own.column.name: own.value for own in score.metrics}}
+    scores = {name: kind.of(score) for name, kind in SCORES.items()}
+    return {**identity, **scores, **{metric.column.name: metric.value for metric in score.metrics}}

@@ -41,8 +41,8 @@ def row(number: int, ending: Ending, score: Score, act_s: Mapping[str, float]) -
         "number": number,
         "end": ending.end.value,
         "reason": ending.detail[:LONGEST_REASON] or None,
-        **{name: own.of(score) for name, own in SCORES.items()},
-        **{own.column.name: own.value for own in score.metrics},
+        **{name: kind.of(score) for name, kind in SCORES.items()},
+        **{metric.column.name: metric.value for metric in score.metrics},
         "time_to_begin_s": score.time_to_begin_s,
         **{name: act_s.get(figure) for name, figure in _ACTS.items()},
     }
@@ -50,7 +50,7 @@ def row(number: int, ending: Ending, score: Score, act_s: Mapping[str, float]) -
 
 def failure(number: int, end: str, reason: str, metrics: Sequence[Column] = ()) -> Row:
     """Return the row of a trial that came to nothing, and why; `metrics` are the columns of further metrics."""
-    rest = dict.fromkeys([*SCORES, *(own.name for own in metrics), *WALL])
+    rest = dict.fromkeys([*SCORES, *(metric.name for metric in metrics), *WALL])
     return {"number": number, "end": end, "reason": reason[:LONGEST_REASON], **rest}
 
 
@@ -61,7 +61,7 @@ def columns(rows: Sequence[Row], metrics: Sequence[Column] = ()) -> Columns:
 
 def results(metrics: Sequence[Column]) -> tuple[str, ...]:
     """Return the columns of the table of results that come from running a trial, with those of further metrics."""
-    return (*RESULT, *(own.name for own in metrics))
+    return (*RESULT, *(metric.name for metric in metrics))
 
 
 def arrow() -> Any:
@@ -82,8 +82,8 @@ def part_schema(metrics: Sequence[Column] = ()) -> Any:
     """Return the Arrow schema of a part: what comes from running trials, with the columns of further metrics."""
     made = arrow()
     types = {"number": "int64", "end": "string", "reason": "string"}
-    types |= {name: own.column.kind for name, own in SCORES.items()}
-    types |= {own.name: own.kind for own in metrics}
+    types |= {name: kind.column.kind for name, kind in SCORES.items()}
+    types |= {metric.name: metric.kind for metric in metrics}
     types |= dict.fromkeys(WALL, "float64")
     names = {"bool": "bool_", "string": "string"}
     return made.schema([(name, getattr(made, names.get(kind, kind))()) for name, kind in types.items()])
@@ -95,11 +95,11 @@ def answer_s(part: bytes) -> float | None:
     return arrow().compute.mean(found).as_py()
 
 
-def encoded(found: Columns, metrics: Sequence[Column] = ()) -> bytes:
+def encoded(columns: Columns, metrics: Sequence[Column] = ()) -> bytes:
     """Return the rows of a chunk as the bytes of its Parquet file, a part of the campaign's table."""
     made = arrow()
     schema = part_schema(metrics)
-    arrays = [made.array(found[entry.name], type=entry.type) for entry in schema]
+    arrays = [made.array(columns[entry.name], type=entry.type) for entry in schema]
     stream = BytesIO()
     table = made.Table.from_arrays(arrays, schema=schema)
     made.parquet.write_table(table, stream, compression=COMPRESSION)

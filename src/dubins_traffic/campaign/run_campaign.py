@@ -61,7 +61,7 @@ class Part:
     def crashed(self) -> bytes:
         """Return the part of a table in which its trials ended their process each time they were run."""
         metrics = scores.columns(self.chunk.metrics)
-        found = [rows.failure(own.number, rows.CRASHED, CRASH, metrics) for own in self.trials]
+        found = [rows.failure(trial.number, rows.CRASHED, CRASH, metrics) for trial in self.trials]
         return rows.encoded(rows.columns(found, metrics), metrics)
 
 
@@ -215,32 +215,32 @@ def run_campaign(
         raise InputError("the cluster's to decide", file="--workers", value=workers, expected=expected)
     if ray is not None:
         check_address(ray)
-    with folders.opened(Path(folder), campaign, resume=resume, records=records) as own:
-        before = sum(end - first for first, end in own.done())
+    with folders.opened(Path(folder), campaign, resume=resume, records=records) as opened:
+        before = sum(end - first for first, end in opened.done())
         if progress is not None:
             progress(before, campaign.total)
         if before < campaign.total:
             with contextlib.closing(crew_at(ray, workers or os.cpu_count() or 1)) as crew:
-                run_left(own, crew, progress)
-        own.finish()
-        return Ran(campaign, own.path, before)
+                run_left(opened, crew, progress)
+        opened.finish()
+        return Ran(campaign, opened.path, before)
 
 
-def run_left(own: Folder, crew: Crew, progress: Progress | None = None) -> None:
+def run_left(folder: Folder, crew: Crew, progress: Progress | None = None) -> None:
     """Run the remaining chunks of a campaign, and store each in its folder; the table is not made yet.
 
     A trial that ends its process each time it is run becomes a row that says so. The exceptions are those of
     `run_campaign`.
     """
-    done = own.done()
+    done = folder.done()
     count = sum(end - first for first, end in done)
     pace = Pace()
-    left = pace.pieces(folders.remaining(own.campaign.chunks(), done))
-    parts = (Part(chunk, own.records) for chunk in left)
+    left = pace.pieces(folders.remaining(folder.campaign.chunks(), done))
+    parts = (Part(chunk, folder.records) for chunk in left)
     for part, found in carry_out(crew, parts, apart=lambda part: part.trials):
         table = part.crashed() if found is None else found
-        own.keep(part.chunk, table)
+        folder.keep(part.chunk, table)
         pace.note(part.chunk, rows.answer_s(table))
         count += part.chunk.count
         if progress is not None:
-            progress(count, own.campaign.total)
+            progress(count, folder.campaign.total)

@@ -64,9 +64,7 @@ def _rules(value: object) -> object:
     raise fault("not rules", "true, false, or a table of parameters of the rules")
 
 
-Mix = Annotated[
-    list[AgentKind], BeforeValidator(_kinds), Field(min_length=1, json_schema_extra=_kinds_schema)
-]
+Mix = Annotated[list[AgentKind], BeforeValidator(_kinds), Field(min_length=1, json_schema_extra=_kinds_schema)]
 RulesValue = Annotated[Any, AfterValidator(_rules), WithJsonSchema({"type": ["boolean", "object"]})]
 Some = Field(min_length=1)
 
@@ -87,27 +85,17 @@ class Factors(Strict):
     intersections: Annotated[list[Annotated[int, Field(ge=2, le=MOST_INTERSECTIONS)]], Some] | None = Field(
         default=None, description="sizes of a random network that takes the place of the road network"
     )
-    lane_width: Annotated[list[Length], Some] | None = Field(
-        default=None, description="widths of a lane, 2w, m"
-    )
-    speed: Annotated[list[Speed], Some] | None = Field(
-        default=None, description="largest speeds of the cars, m/s"
-    )
-    yaw_rate: Annotated[list[YawRate], Some] | None = Field(
-        default=None, description="largest yaw rates, rad/s"
-    )
-    turning_radius: Annotated[list[Radius], Some] | None = Field(
-        default=None, description="smallest turning radii, m"
-    )
+    lane_width: Annotated[list[Length], Some] | None = Field(default=None, description="widths of a lane, 2w, m")
+    speed: Annotated[list[Speed], Some] | None = Field(default=None, description="largest speeds of the cars, m/s")
+    yaw_rate: Annotated[list[YawRate], Some] | None = Field(default=None, description="largest yaw rates, rad/s")
+    turning_radius: Annotated[list[Radius], Some] | None = Field(default=None, description="smallest turning radii, m")
     sensing_radius: Annotated[list[Length], Some] | None = Field(
         default=None, description="distances within which other cars are seen, m"
     )
     rules: Annotated[list[RulesValue], Some] | None = Field(
         default=None, description="whether the rules are judged, or their parameters"
     )
-    duration: Annotated[list[Seconds], Some] | None = Field(
-        default=None, description="durations of a trial, s"
-    )
+    duration: Annotated[list[Seconds], Some] | None = Field(default=None, description="durations of a trial, s")
 
     @model_validator(mode="after")
     def _one_network(self) -> Factors:
@@ -120,9 +108,7 @@ class ConfigurationEntry(Strict):
     """A configuration under a name of its own."""
 
     name: str = Field(pattern=NAME, max_length=80, description="what it is called in tables")
-    file: str | None = Field(
-        default=None, min_length=1, description="a file, or the name of a shipped configuration"
-    )
+    file: str | None = Field(default=None, min_length=1, description="a file, or the name of a shipped configuration")
     document: dict[str, Any] | None = Field(default=None, description="the configuration itself")
 
     @model_validator(mode="after")
@@ -155,9 +141,7 @@ class CampaignModel(Strict):
         default=None,
         description="trials of each combination for each controller; left out: as each configuration says",
     )
-    controllers: Annotated[list[str], Some] = Field(
-        description="built-in names, module:Class or path/to/file.py:Class"
-    )
+    controllers: Annotated[list[str], Some] = Field(description="built-in names, module:Class or path/to/file.py:Class")
     configurations: Annotated[list[Entry], Some] = Field(
         description="files, names of shipped configurations, or {name, file} or {name, document}"
     )
@@ -208,18 +192,18 @@ def vary(document: Mapping[str, Any], factors: Mapping[str, Any], fields: Mappin
     """
     if not factors and not fields:
         return deepcopy(dict(document))
-    own = raised(document)
+    changed = raised(document)
     for name, change in _CHANGES.items():
         if name in factors:
             try:
-                change(own, factors[name])
+                change(changed, factors[name])
             except InputError as error:
                 raise error.within(field=f"factors.{name}") from None
     if "e_agents" in factors or "e_agent_kinds" in factors:
-        _agents(own, factors.get("e_agents"), factors.get("e_agent_kinds"))
+        _agents(changed, factors.get("e_agents"), factors.get("e_agent_kinds"))
     for path, value in fields.items():
-        put(own, path, value)
-    return own
+        put(changed, path, value)
+    return changed
 
 
 def put(document: Document, path: str, value: Any) -> None:
@@ -249,9 +233,7 @@ def _below(place: Any, step: str | int, path: str) -> Any:
         return cast("Document", place).get(step)
     if isinstance(step, int) and isinstance(place, list) and step < len(cast("list[Any]", place)):
         return cast("list[Any]", place)[step]
-    raise InputError(
-        "leads nowhere in this configuration", field=f"fields.{path}", value=step, expected="a field"
-    )
+    raise InputError("leads nowhere in this configuration", field=f"fields.{path}", value=step, expected="a field")
 
 
 def _check_known(path: str, steps: Sequence[str | int]) -> None:
@@ -299,8 +281,8 @@ def _grid(document: Document, shape: Sequence[int]) -> None:
     grid: Document = network.get("grid") or {}
     length = grid.get("length") or _length(document.get("rnd"))
     document.pop("rnd", None)
-    own = {**grid, "rows": shape[0], "columns": shape[1]}
-    document["network"] = {"grid": own if length is None else {**own, "length": length}}
+    shaped = {**grid, "rows": shape[0], "columns": shape[1]}
+    document["network"] = {"grid": shaped if length is None else {**shaped, "length": length}}
 
 
 def _intersections(document: Document, count: int) -> None:

@@ -38,11 +38,11 @@ def is_part(path: Path, count: int, metrics: Sequence[Column] = ()) -> bool:
     """Tell whether the file at `path` is a whole part of `count` rows, with the columns of further metrics."""
     made = rows.arrow()
     try:
-        found = made.parquet.ParquetFile(path)
+        parquet = made.parquet.ParquetFile(path)
     except (OSError, made.ArrowInvalid):
         return False
     names = rows.part_schema(metrics).names
-    return found.metadata.num_rows == count and found.schema_arrow.names == names
+    return parquet.metadata.num_rows == count and parquet.schema_arrow.names == names
 
 
 def merge(campaign: Campaign, parts: Sequence[Path], kind: Kind, target: Path) -> None:
@@ -66,9 +66,7 @@ def merge(campaign: Campaign, parts: Sequence[Path], kind: Kind, target: Path) -
             count += len(numbers)
             writer.write_table(group, row_group_size=GROUP)
     if count != campaign.total:
-        raise InputError(
-            "not all trials have rows", file=str(target.parent), value=count, expected=str(campaign.total)
-        )
+        raise InputError("not all trials have rows", file=str(target.parent), value=count, expected=str(campaign.total))
 
 
 def read(folder: Path, campaign: Campaign, parts: Sequence[Path], kind: Kind = Kind.RESULTS) -> Any:
@@ -77,11 +75,11 @@ def read(folder: Path, campaign: Campaign, parts: Sequence[Path], kind: Kind = K
     whole = folder / (RESULTS if kind is Kind.RESULTS else WALL)
     try:
         if whole.is_file():
-            found = made.parquet.read_table(whole)
-            if found.schema.names != _schema(campaign, kind).names:
+            table = made.parquet.read_table(whole)
+            if table.schema.names != _schema(campaign, kind).names:
                 expected = "the table of a campaign that was run with this version of dubins-traffic"
                 raise InputError("has other columns", file=str(whole), expected=expected)
-            return found
+            return table
         empty = _schema(campaign, kind).empty_table()
         return made.concat_tables([empty, *(shaped(campaign, _load(part), kind) for part in parts)])
     except (OSError, made.ArrowInvalid) as error:
@@ -92,19 +90,19 @@ def faulty(folder: Path) -> str:
     """Return the notice that trials of a finished campaign failed or ended by a fault; empty if none did."""
     made = rows.arrow()
     compute: Any = made.compute
-    found = made.parquet.read_table(folder / RESULTS, columns=["number", "controller", "end", "reason"])
-    bad = found.filter(compute.is_in(found["end"], made.array(sorted(FAULTS | rows.NOTHING))))
+    table = made.parquet.read_table(folder / RESULTS, columns=["number", "controller", "end", "reason"])
+    bad = table.filter(compute.is_in(table["end"], made.array(sorted(FAULTS | rows.NOTHING))))
     if not len(bad):
         return ""
     first = bad.slice(0, 1).to_pylist()[0]
     told = f"trial {first['number']} with {first['controller']}: {first['end']}: {first['reason']}"
-    return fault_notice(Counter(bad["end"].to_pylist()), len(found), told)
+    return fault_notice(Counter(bad["end"].to_pylist()), len(table), told)
 
 
 def assumption(folder: Path) -> tuple[int, int]:
     """Return the number of judged trials of a finished campaign in which e-agents broke the assumption, and of all."""
-    found = rows.arrow().parquet.read_table(folder / RESULTS, columns=["assumption_broken"])
-    known = found["assumption_broken"].drop_null().to_pylist()
+    table = rows.arrow().parquet.read_table(folder / RESULTS, columns=["assumption_broken"])
+    known = table["assumption_broken"].drop_null().to_pylist()
     return sum(known), len(known)
 
 
@@ -158,23 +156,22 @@ def shaped(campaign: Campaign, part: Any, kind: Kind) -> Any:
     if kind is Kind.WALL:
         return part.select(schema.names).cast(schema)
     cells, controllers, trials = places(campaign, part["number"].to_numpy())
-    own: list[Cell] = [campaign.cells[k] for k in cells.tolist()]
+    chosen_cells: list[Cell] = [campaign.cells[k] for k in cells.tolist()]
     whose: list[int] = controllers.tolist()
     known: dict[str, list[Any]] = {
         "cell": cells.tolist(),
-        "configuration": [cell.configuration for cell in own],
+        "configuration": [cell.configuration for cell in chosen_cells],
         "controller": [campaign.controllers[k] for k in whose],
         "ran": [ran(campaign.places[k]) for k in whose],
         "trial": trials.tolist(),
-        "seed": [cell.seed for cell in own],
+        "seed": [cell.seed for cell in chosen_cells],
     }
     for name in campaign.factors:
-        values = [cell.values[name] for cell in own]
+        values = [cell.values[name] for cell in chosen_cells]
         text = schema.field(FACTOR + name).type == made.string()
         known[FACTOR + name] = [factor_text(value) for value in values] if text else values
     arrays = [
-        made.array(known[entry.name], type=entry.type) if entry.name in known else part[entry.name]
-        for entry in schema
+        made.array(known[entry.name], type=entry.type) if entry.name in known else part[entry.name] for entry in schema
     ]
     return made.Table.from_arrays(arrays, schema=schema)
 

@@ -27,9 +27,7 @@ def _broken(rule: str) -> Callable[[Score], Value]:
 
 def _fallen(part: str) -> Callable[[Score], Value]:
     return _of_verdict(
-        lambda verdict: sum(
-            one.car != EGO_NAME and assumption_of(one.rule) == part for one in verdict.violations
-        )
+        lambda verdict: sum(one.car != EGO_NAME and assumption_of(one.rule) == part for one in verdict.violations)
     )
 
 

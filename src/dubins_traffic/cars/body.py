@@ -85,9 +85,7 @@ class Bounds:
             )
         low = self.speed_low
         if not (math.isfinite(low) and low <= self.speed):
-            raise InputError(
-                "not a smallest speed", field="speed_min", value=low, expected=f"a number <= {self.speed}"
-            )
+            raise InputError("not a smallest speed", field="speed_min", value=low, expected=f"a number <= {self.speed}")
 
     @property
     def speed_low(self) -> float:

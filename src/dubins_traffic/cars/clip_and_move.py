@@ -76,21 +76,19 @@ def _alike(columns: Floats) -> Ints:
 
 
 @jit
-def clip(
-    r: MotionConstants, b: int, commands: Floats, speed: Floats, yaw: Floats, first: int, last: int
-) -> None:
+def clip(r: MotionConstants, b: int, commands: Floats, speed: Floats, yaw: Floats, first: int, last: int) -> None:
     """Clip `commands` (B * N, 2) of the cars `first` (index) to `last` (index) - 1, whose bounds are those of trial b.
 
     They are clipped in place, the speed first, and also written to `speed` (B * N,), m/s, and `yaw` (B * N,), rad/s.
     """
     low, high, most, slack, curvature = r.low[b], r.high[b], r.most[b], r.slack[b], r.curvature[b]
-    own, speed, yaw = commands[first:last], speed[first:last], yaw[first:last]
+    asked, speed, yaw = commands[first:last], speed[first:last], yaw[first:last]
     for f in range(last - first):
-        u = min(max(own[f, 0], low), high)
+        u = min(max(asked[f, 0], low), high)
         bound = min(most, slack + curvature * abs(u))
-        w = min(max(own[f, 1], -bound), bound)
-        own[f, 0] = u
-        own[f, 1] = w
+        w = min(max(asked[f, 1], -bound), bound)
+        asked[f, 0] = u
+        asked[f, 1] = w
         speed[f] = u
         yaw[f] = w
 

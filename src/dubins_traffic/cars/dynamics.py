@@ -152,9 +152,7 @@ def require_dubins(car: Car, who: str) -> None:
         Of the field ``car.model``.
     """
     if car.model != DUBINS:
-        raise InputError(
-            f"{who} for the Dubins car only", field="car.model", value=car.model, expected=DUBINS
-        )
+        raise InputError(f"{who} for the Dubins car only", field="car.model", value=car.model, expected=DUBINS)
 
 
 @cache
@@ -189,9 +187,7 @@ class Bicycle:
         for name, value in parameters.items():
             if isinstance(value, bool) or not isinstance(value, int | float) or not LEAST <= value <= MOST:
                 expected = f"a number from {LEAST:g} to {MOST:g}"
-                raise InputError(
-                    "out of range", field=f"car.parameters.{name}", value=value, expected=expected
-                )
+                raise InputError("out of range", field=f"car.parameters.{name}", value=value, expected=expected)
         self._base = float(parameters["wheelbase"])
         self._gain, self._loss = float(parameters["acceleration"]), float(parameters["braking"])
         parts = min(max(1, ceil(period / FINEST - 1e-9)), MOST_PARTS)

@@ -120,15 +120,15 @@ def forget_parted(state: State, cars: CarTable, obstacles: ObstacleTable, work: 
 @jit
 def _gap(state: State, cars: CarTable, obstacles: ObstacleTable, b: int, i: int, other: int) -> float:
     """Return the gap, metres, between car i and `other`, a car or obstacle -1 - k."""
-    own = box_at(b, i, state, cars)
+    box = box_at(b, i, state, cars)
     if other >= 0:
-        best, _, _, _, _ = separation(own, box_at(b, other, state, cars))
+        best, _, _, _, _ = separation(box, box_at(b, other, state, cars))
         return best
     best = NEVER
     for k in range(obstacles.off[b], obstacles.off[b + 1]):
         part_k = obstacles.parts[k]
         if part_k.owner == -1 - other:
-            distance, _, _, _, _ = separation(own, box_of(part_k))
+            distance, _, _, _, _ = separation(box, box_of(part_k))
             best = min(best, distance)
     return best
 
@@ -359,9 +359,7 @@ def _resolve(b: int, pairs: int, dt: float, motion: Motion) -> None:
 @jit
 def _move(b: int, n: int, until: float, dt: float, state: State) -> None:
     speed, yaw = state.speed[b, n], state.yaw_rate[b, n]
-    x, y, c, s = advance(
-        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw, min(until, dt)
-    )
+    x, y, c, s = advance(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw, min(until, dt))
     state.x[b, n] = x
     state.y[b, n] = y
     state.c[b, n] = c
@@ -408,14 +406,14 @@ def _note_contact(b: int, i: int, j: int, now: float, motion: Motion) -> None:
     if not _begin_touching(b, i, other, work):
         return
     drive = _drive(b, i, work.until[i], state)
-    own = driven(box_at(b, i, state, cars), drive, now)
+    box = driven(box_at(b, i, state, cars), drive, now)
     its = Drive(0.0, 0.0, 0.0)
     if j >= 0:
         its = _drive(b, j, work.until[j], state)
         hit = driven(box_at(b, j, state, cars), its, now)
     else:
         hit = box_of(motion.obstacles.parts[-1 - j])
-    _, nx, ny, px, py = separation(own, hit)
+    _, nx, ny, px, py = separation(box, hit)
     number: int = work.found[0]
     row = work.contact[number]
     row.b = b
@@ -426,9 +424,9 @@ def _note_contact(b: int, i: int, j: int, now: float, motion: Motion) -> None:
     row.py = py
     row.nx = nx
     row.ny = ny
-    row.closing = _closing(own, drive, now, row)
+    row.closing = _closing(box, drive, now, row)
     row.other_closing = -_closing(hit, its, now, row)
-    row.moved = _moved(own, drive)
+    row.moved = _moved(box, drive)
     row.other_moved = _moved(hit, its)
     work.found[0] += 1
 
@@ -438,6 +436,4 @@ def _closing(box: Box, drive: Drive, now: float, row: Meeting) -> float:
     """Return the speed along the normal of the point of a body that touches, m/s."""
     speed, yaw, _ = held(drive, now)
     turn = yaw if box.half_length > 0.0 else 0.0
-    return row.nx * (speed * box.c - turn * (row.py - box.y)) + row.ny * (
-        speed * box.s + turn * (row.px - box.x)
-    )
+    return row.nx * (speed * box.c - turn * (row.py - box.y)) + row.ny * (speed * box.s + turn * (row.px - box.x))

@@ -108,35 +108,35 @@ def spacing(trials: int, cars: int, drift: Floats) -> Spacing:
 
 def unknown_spacing(trials: int, cars: int) -> Spacing:
     """Return the spacing of cars whose motion is unknown: any two may be close."""
-    own = spacing(trials, cars, np.zeros(trials))
-    return own.replace(head=np.zeros((trials, 0), dtype=np.int64))
+    unknown = spacing(trials, cars, np.zeros(trials))
+    return unknown.replace(head=np.zeros((trials, 0), dtype=np.int64))
 
 
 @jit_inline
-def spacing_loss(own: Spacing, b: int, tick: int) -> float:
+def spacing_loss(spacing: Spacing, b: int, tick: int) -> float:
     """Return by how much two cars of trial b may have closed in since `apart` was measured, up to `tick`, metres."""
-    return 2.0 * (tick - own.since[b]) * own.drift[b]
+    return 2.0 * (tick - spacing.since[b]) * spacing.drift[b]
 
 
 @jit_inline
-def ticks_within(distance: float, own: Spacing, b: int) -> int:
+def ticks_within(distance: float, spacing: Spacing, b: int) -> int:
     """Return how many ticks, at least 1, any car of trial b needs to drive `distance` (m); 1 if that is unknown."""
-    if distance <= own.drift[b] or own.drift[b] <= 0.0:
+    if distance <= spacing.drift[b] or spacing.drift[b] <= 0.0:
         return 1
-    return int(min(distance / own.drift[b], MOST_TICKS))
+    return int(min(distance / spacing.drift[b], MOST_TICKS))
 
 
 @jit_inline
-def refresh_spacing(state: State, b: int, tick: int, own: Spacing) -> None:
+def refresh_spacing(state: State, b: int, tick: int, spacing: Spacing) -> None:
     """Measure how far apart the cars of trial b are in frame `tick`, if that was `REFRESH_TICKS` ago or more."""
-    if not _is_known(b, tick, own):
-        _measure_spacing(state, b, tick, own)
+    if not _is_known(b, tick, spacing):
+        _measure_spacing(state, b, tick, spacing)
 
 
 @jit_look
-def _is_known(b: int, tick: int, own: Spacing) -> bool:
+def _is_known(b: int, tick: int, spacing: Spacing) -> bool:
     """Tell whether the spacing of trial b was measured less than `REFRESH_TICKS` ago."""
-    return tick - own.since[b] < REFRESH_TICKS
+    return tick - spacing.since[b] < REFRESH_TICKS
 
 
 @jit_inline
@@ -171,14 +171,14 @@ def _enter_cell(n: int, kx: int, ky: int, head: Ints, link: Ints, cell: Rows[Pla
 
 
 @jit
-def _measure_spacing(state: State, b: int, tick: int, own: Spacing) -> None:
+def _measure_spacing(state: State, b: int, tick: int, spacing: Spacing) -> None:
     n = state.count[b]
-    apart = own.apart[b]
-    own.since[b] = tick
+    apart = spacing.apart[b]
+    spacing.since[b] = tick
     for i in range(n):
-        apart[i] = CELL * CELL if own.head.shape[1] > 0 else 1e300
-    if own.head.shape[1] > 0:
-        _nearest_in_cells(state, b, apart, own.head[b], own.link[b], own.cell[b])
+        apart[i] = CELL * CELL if spacing.head.shape[1] > 0 else 1e300
+    if spacing.head.shape[1] > 0:
+        _nearest_in_cells(state, b, apart, spacing.head[b], spacing.link[b], spacing.cell[b])
     else:
         for i in range(1, n):
             for j in range(i):
@@ -189,7 +189,7 @@ def _measure_spacing(state: State, b: int, tick: int, own: Spacing) -> None:
     for i in range(n):
         apart[i] = sqrt(apart[i])
         least = min(least, apart[i])
-    own.least[b] = least
+    spacing.least[b] = least
 
 
 @jit_rare
@@ -213,30 +213,28 @@ def _nearest_in_cells(state: State, b: int, apart: Floats, head: Ints, link: Int
 
 
 @jit
-def list_near(state: State, b: int, tick: int, x: float, y: float, far: float, own: Spacing) -> int:
-    """List in `own.near` all cars of trial b that may be within `far` (m) of a point; return how many are listed."""
-    size = own.head.shape[1]
+def list_near(state: State, b: int, tick: int, x: float, y: float, far: float, spacing: Spacing) -> int:
+    """List in `spacing.near` all cars of trial b that may be within `far` (m) of a point; return how many."""
+    size = spacing.head.shape[1]
     count = 0
-    if size == 0 or far + (tick - own.since[b]) * own.drift[b] > CELL:
+    if size == 0 or far + (tick - spacing.since[b]) * spacing.drift[b] > CELL:
         for n in range(state.count[b]):
-            own.near[n] = n
+            spacing.near[n] = n
         return int(state.count[b])
     kx = floor(float(x / CELL))
     ky = floor(float(y / CELL))
     for mx in range(kx - 1, kx + 2):
         for my in range(ky - 1, ky + 2):
-            n = _first_in_cell(own.head[b, _bucket(mx, my, size)], mx, my, own.link[b], own.cell[b])
+            n = _first_in_cell(spacing.head[b, _bucket(mx, my, size)], mx, my, spacing.link[b], spacing.cell[b])
             while n >= 0:
-                own.near[count] = n
+                spacing.near[count] = n
                 count += 1
-                n = _first_in_cell(own.link[b, n], mx, my, own.link[b], own.cell[b])
+                n = _first_in_cell(spacing.link[b, n], mx, my, spacing.link[b], spacing.cell[b])
     return count
 
 
 @jit_rare
-def candidates(
-    b: int, distance: float, margin: float, state: State, obstacles: ObstacleTable, search: Search
-) -> int:
+def candidates(b: int, distance: float, margin: float, state: State, obstacles: ObstacleTable, search: Search) -> int:
     """List the pairs of trial b that may meet in `Search.pair` and return how many there are.
 
     They are cars i < j whose centres are nearer than `distance` (m), and (i, -1 - p) for each obstacle part p of which

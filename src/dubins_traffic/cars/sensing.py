@@ -149,16 +149,16 @@ def _view(b: int, n: int, row: int, seen: Seen, state: State, labels: Labels) ->
     pose.s = state.s[b, n]
     pose.speed = state.speed[b, n]
     pose.yaw_rate = state.yaw_rate[b, n]
-    own = seen.labels[row]
+    label = seen.labels[row]
     bits = np.int64(labels.bits[b, n])
-    other = (own.car ^ n) | (own.segment ^ labels.segment[b, n]) | (own.at ^ labels.at[b, n])
-    other |= (own.crosses ^ labels.crosses[b, n]) | (own.lane ^ labels.lane[b, n]) | (own.bits ^ bits)
-    own.car = n
-    own.segment = labels.segment[b, n]
-    own.at = labels.at[b, n]
-    own.crosses = labels.crosses[b, n]
-    own.lane = labels.lane[b, n]
-    own.bits = int(bits)
+    other = (label.car ^ n) | (label.segment ^ labels.segment[b, n]) | (label.at ^ labels.at[b, n])
+    other |= (label.crosses ^ labels.crosses[b, n]) | (label.lane ^ labels.lane[b, n]) | (label.bits ^ bits)
+    label.car = n
+    label.segment = labels.segment[b, n]
+    label.at = labels.at[b, n]
+    label.crosses = labels.crosses[b, n]
+    label.lane = labels.lane[b, n]
+    label.bits = int(bits)
     return other
 
 
@@ -251,22 +251,22 @@ def scan(
     meets a body nearer than `shortest` (m) reads -inf.
     """
     state, cars, obstacles = around.state, around.cars, around.obstacles
-    own = box_at(b, viewer, state, cars)
+    box = box_at(b, viewer, state, cars)
     for k in range(rays.shape[0]):
         ranges[k] = NEVER
     far = longest + cars.reach[b]
     for n in range(state.count[b]):
-        dx = state.x[b, n] - own.x
-        dy = state.y[b, n] - own.y
+        dx = state.x[b, n] - box.x
+        dy = state.y[b, n] - box.y
         if n != viewer and dx * dx + dy * dy < far * far:
-            _sweep(own, box_at(b, n, state, cars), rays, ranges)
+            _sweep(box, box_at(b, n, state, cars), rays, ranges)
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         part = obstacles.parts[p]
-        dx = part.x - own.x
-        dy = part.y - own.y
+        dx = part.x - box.x
+        dy = part.y - box.y
         far = longest + part.reach
         if dx * dx + dy * dy < far * far:
-            _sweep(own, box_of(part), rays, ranges)
+            _sweep(box, box_of(part), rays, ranges)
     for k in range(rays.shape[0]):
         if ranges[k] > longest:
             ranges[k] = np.inf
@@ -275,10 +275,10 @@ def scan(
 
 
 @jit
-def _sweep(own: Box, box: Box, rays: Rows[Ray], ranges: Floats) -> None:
+def _sweep(body: Box, box: Box, rays: Rows[Ray], ranges: Floats) -> None:
     """Lower each of the ranges (R,) to the distance at which its ray meets the body `box`, if that is less."""
     for k in range(rays.shape[0]):
         ray = rays[k]
-        ex = ray.c * own.c - ray.s * own.s
-        ey = ray.c * own.s + ray.s * own.c
-        ranges[k] = min(ranges[k], ray_box(own.x, own.y, ex, ey, box))
+        ex = ray.c * body.c - ray.s * body.s
+        ey = ray.c * body.s + ray.s * body.c
+        ranges[k] = min(ranges[k], ray_box(body.x, body.y, ex, ey, box))

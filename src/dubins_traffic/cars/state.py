@@ -57,14 +57,14 @@ class _Holds:
         self._flag = flag
 
     @overload
-    def __get__(self, own: None, kind: type) -> _Holds: ...
+    def __get__(self, propositions: None, kind: type) -> _Holds: ...
 
     @overload
-    def __get__(self, own: Propositions, kind: type) -> bool: ...
+    def __get__(self, propositions: Propositions, kind: type) -> bool: ...
 
-    def __get__(self, own: Propositions | None, kind: type) -> bool | _Holds:
-        """Return whether it is true of `own`."""
-        return self if own is None else own.bits & self._flag != 0
+    def __get__(self, propositions: Propositions | None, kind: type) -> bool | _Holds:
+        """Return whether it is true of `propositions`."""
+        return self if propositions is None else propositions.bits & self._flag != 0
 
 
 class Propositions(NamedTuple):
@@ -206,10 +206,10 @@ def put_observed(state: State, labels: Labels, observation: Observation) -> None
     state.count[0] = 1 + len(others)
     x, y, c, s, speed, yaw_rate = state[:6]
     segment, at, crosses, lane, bits = labels
-    for n, own in enumerate((observation, *others)):
-        x[0, n], y[0, n], c[0, n], s[0, n] = own.pose
-        speed[0, n], yaw_rate[0, n] = own.twist
-        segment[0, n], at[0, n], crosses[0, n], lane[0, n], bits[0, n] = own.propositions
+    for n, seen in enumerate((observation, *others)):
+        x[0, n], y[0, n], c[0, n], s[0, n] = seen.pose
+        speed[0, n], yaw_rate[0, n] = seen.twist
+        segment[0, n], at[0, n], crosses[0, n], lane[0, n], bits[0, n] = seen.propositions
 
 
 @dataclass(frozen=True, slots=True)
@@ -287,9 +287,7 @@ class Frames:
         reals: list[Any] = [getattr(self, name) for name in State.field_names[:6]]
         labels: list[Any] = [getattr(self, name) for name in Labels.field_names]
         count: Any = np.full(len(self), self.x.shape[1], dtype=np.int64)
-        return State(*map(np.ascontiguousarray, reals), count=count), Labels(
-            *map(np.ascontiguousarray, labels)
-        )
+        return State(*map(np.ascontiguousarray, reals), count=count), Labels(*map(np.ascontiguousarray, labels))
 
     @property
     def time(self) -> Floats:

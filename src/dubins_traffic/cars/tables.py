@@ -101,8 +101,8 @@ def pack_obstacles(obstacles: Sequence[Sequence[Obstacle]]) -> ObstacleTable:
     off = [0]
     parts: list[tuple[float, ...]] = []
     owners: list[int] = []
-    for own in obstacles:
-        for number, obstacle in enumerate(own):
+    for each in obstacles:
+        for number, obstacle in enumerate(each):
             found = _parts(obstacle)
             parts += found
             owners += [number] * len(found)

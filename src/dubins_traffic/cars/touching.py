@@ -44,10 +44,10 @@ class Bodies:
 
     def separation(self, state: State, car: int, other: int) -> Separation:
         """Return gap, normal and point of `kernels.boxes.separation` for a car and another, or obstacle -1 - k."""
-        own = Box(*_pose(state, car), *self.box)
+        box = Box(*_pose(state, car), *self.box)
         if other >= 0:
-            return separation(own, Box(*_pose(state, other), *self.box))
-        return min(separation(own, part) for part in self.parts[other])
+            return separation(box, Box(*_pose(state, other), *self.box))
+        return min(separation(box, part) for part in self.parts[other])
 
 
 class Touching:
@@ -70,7 +70,7 @@ class Touching:
 
     def update(self, tick: int, state: State) -> tuple[Contact, ...]:
         """Return the new contacts of frame `tick`, whose state is given; its speeds are those of the tick before."""
-        found: list[Contact] = []
+        contacts: list[Contact] = []
         cars = range(state.x.shape[1])
         near = [pair for pair in itertools.combinations(cars, 2) if self._near(state, *pair)]
         for pair in [*near, *itertools.product(cars, self._bodies.parts)]:
@@ -79,9 +79,9 @@ class Touching:
                 self._touching.discard(pair)
             elif between[0] <= 0.0 and pair not in self._touching:
                 self._touching.add(pair)
-                found.append(self.contact(tick, state, pair))
+                contacts.append(self.contact(tick, state, pair))
         self._touching = {pair for pair in self._touching if pair[1] < 0 or pair in near}
-        return tuple(found)
+        return tuple(contacts)
 
     def _near(self, state: State, car: int, other: int) -> bool:
         dx, dy = state.x[0, other] - state.x[0, car], state.y[0, other] - state.y[0, car]
@@ -92,7 +92,7 @@ class Touching:
         car, other = pair
         _, nx, ny, x, y = self._bodies.separation(state, *pair)
         its = (0.0, False) if other < 0 else self._motion(state, other, (x, y), (-nx, -ny))
-        own = self._motion(state, car, (x, y), (nx, ny))
+        motion = self._motion(state, car, (x, y), (nx, ny))
         return Contact(
             tick=tick,
             time=tick * self._period,
@@ -102,8 +102,8 @@ class Touching:
             y=y,
             nx=nx,
             ny=ny,
-            closing=(own[0], its[0]),
-            moved=(own[1], its[1]),
+            closing=(motion[0], its[0]),
+            moved=(motion[1], its[1]),
         )
 
     def _motion(
@@ -113,9 +113,7 @@ class Touching:
         x, y, c, s = _pose(state, n)
         speed = float(state.speed[0, n])
         turn = float(state.yaw_rate[0, n]) if self._bodies.turns else 0.0
-        closing = normal[0] * (speed * c - turn * (point[1] - y)) + normal[1] * (
-            speed * s + turn * (point[0] - x)
-        )
+        closing = normal[0] * (speed * c - turn * (point[1] - y)) + normal[1] * (speed * s + turn * (point[0] - x))
         return closing, max(abs(speed), abs(turn) * self._bodies.box[0]) > STANDING
 
 

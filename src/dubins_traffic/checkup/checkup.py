@@ -114,11 +114,7 @@ def _starts(run: Pass) -> Finding:
 
 
 def _survives(run: Pass) -> Finding:
-    failed = [
-        f"{drive.name}: {drive.end} {drive.detail}".rstrip()
-        for drive in run.drives
-        if drive.end != End.DURATION
-    ]
+    failed = [f"{drive.name}: {drive.end} {drive.detail}".rstrip() for drive in run.drives if drive.end != End.DURATION]
     whole = len(scenarios())
     missing = whole - len(run.drives)
     if missing:

@@ -51,7 +51,7 @@ class Robustness:
 
     def cell(self, delay: int, noise: float, loss: float) -> Cell:
         """Return one cell."""
-        return next(own for own in self.cells if (own.delay, own.noise, own.loss) == (delay, noise, loss))
+        return next(cell for cell in self.cells if (cell.delay, cell.noise, cell.loss) == (delay, noise, loss))
 
 
 def robustness(
@@ -103,7 +103,7 @@ def robustness(
         scores[result.instance.disturbances].append(result.score)
         if progress is not None:
             progress(count, len(jobs))
-    return Robustness(controller, tuple(_cell(kind, own) for kind, own in scores.items()))
+    return Robustness(controller, tuple(_cell(kind, score) for kind, score in scores.items()))
 
 
 def _cell(kind: Disturbances, scores: Sequence[Score]) -> Cell:
@@ -111,6 +111,4 @@ def _cell(kind: Disturbances, scores: Sequence[Score]) -> Cell:
     clean = sum(verdict.clean for verdict in verdicts)
     others = sum(verdict.assumption_broken for verdict in verdicts)
     rounds = sum(score.counted_rounds for score in scores)
-    return Cell(
-        kind.command_delay, kind.position_noise, kind.command_loss, len(scores), clean, others, rounds
-    )
+    return Cell(kind.command_delay, kind.position_noise, kind.command_loss, len(scores), clean, others, rounds)

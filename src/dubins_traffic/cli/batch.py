@@ -30,9 +30,7 @@ EXAMPLES = options.examples(
     "batch town --trials 200 --threads 2 --keep failures --records out",
 )
 
-TogetherOption = Annotated[
-    int, typer.Option("--batch", metavar="B", min=1, help="Trials that are stepped together.")
-]
+TogetherOption = Annotated[int, typer.Option("--batch", metavar="B", min=1, help="Trials that are stepped together.")]
 ThreadsOption = Annotated[
     int, typer.Option("--threads", metavar="T", min=1, help="Groups that run at a time, if all is compiled.")
 ]
@@ -74,9 +72,7 @@ def batch(
     maps.report(drawn.network)
     count = drawn.number_trials if trials is None else trials
     if not json:
-        faults.warn(
-            short_notice([partial(draw, drawn, seed, trial) for trial in range(min(count, LOOKED_AT))])
-        )
+        faults.warn(short_notice([partial(draw, drawn, seed, trial) for trial in range(min(count, LOOKED_AT))]))
     run = partial(
         run_batch,
         drawn,
@@ -92,7 +88,7 @@ def batch(
         metrics=metric or (),
     )
     found = _run(run, count, records, json=json)
-    if not faults.tell_failed([(own.instance, own.ending) for own in found.outcomes]):
+    if not faults.tell_failed([(outcome.instance, outcome.ending) for outcome in found.outcomes]):
         raise typer.Exit(faults.FAILED)
 
 

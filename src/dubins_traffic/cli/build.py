@@ -19,9 +19,7 @@ WARM_EXAMPLES = options.examples("warm")
 def build(
     level: Annotated[
         str | None,
-        typer.Option(
-            help="For another level of processors: x86-64-v2, -v3 or -v4.", show_default="this one's"
-        ),
+        typer.Option(help="For another level of processors: x86-64-v2, -v3 or -v4.", show_default="this one's"),
     ] = None,
     folder: Annotated[
         Path | None,

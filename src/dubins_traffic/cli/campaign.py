@@ -34,9 +34,7 @@ campaign = typer.Typer(
 
 FolderOption = Annotated[
     str,
-    typer.Option(
-        "--output", "-o", metavar="DIR", help="Folder of the campaign, made if missing.", show_default=False
-    ),
+    typer.Option("--output", "-o", metavar="DIR", help="Folder of the campaign, made if missing.", show_default=False),
 ]
 RayOption = Annotated[
     str | None,
@@ -87,9 +85,7 @@ def run(
 
     try:
         with progress() as show:
-            ran = run_campaign(
-                planned, folder, workers=workers, ray=ray, resume=resume, records=records, progress=tell
-            )
+            ran = run_campaign(planned, folder, workers=workers, ray=ray, resume=resume, records=records, progress=tell)
     except (KeyboardInterrupt, ClusterLostError) as error:
         why = "interrupted" if isinstance(error, KeyboardInterrupt) else str(error)
         faults.tell(f"{why}; {kept(Path(folder))} of {total} trials are kept, --resume goes on")
@@ -113,20 +109,14 @@ def report(
     folder: Annotated[str, typer.Argument(metavar="DIR", help="Folder of a campaign.", show_default=False)],
     output: Annotated[
         str | None,
-        typer.Option(
-            "--output", "-o", metavar="FOLDER", help="Where to write it.", show_default="DIR/report"
-        ),
+        typer.Option("--output", "-o", metavar="FOLDER", help="Where to write it.", show_default="DIR/report"),
     ] = None,
     worst: Annotated[
         int,
-        typer.Option(
-            "--worst", metavar="K", min=0, max=100, help="Replays of the K worst trials of each controller."
-        ),
+        typer.Option("--worst", metavar="K", min=0, max=100, help="Replays of the K worst trials of each controller."),
     ] = 3,
     overwrite: options.Replace = False,
-    wall: Annotated[
-        bool, typer.Option("--wall", help="Also wall-clock times, which differ from run to run.")
-    ] = False,
+    wall: Annotated[bool, typer.Option("--wall", help="Also wall-clock times, which differ from run to run.")] = False,
     everything: Annotated[
         bool, typer.Option("--all", help="Show all metrics, differences and worst trials here, too.")
     ] = False,
@@ -172,9 +162,7 @@ def _print(written: Written, folder: str, *, everything: bool) -> None:
 def compare(
     first: Annotated[str, typer.Argument(metavar="A", help="Folder of a campaign.", show_default=False)],
     second: Annotated[str, typer.Argument(metavar="B", help="Folder of another one.", show_default=False)],
-    everything: Annotated[
-        bool, typer.Option("--all", help="Show metrics that are 0 in both campaigns, too.")
-    ] = False,
+    everything: Annotated[bool, typer.Option("--all", help="Show metrics that are 0 in both campaigns, too.")] = False,
 ) -> None:
     """Compare two campaigns: controllers of the same name, or if there is none, the best of each.
 
@@ -200,15 +188,11 @@ def replay(
     folder: Annotated[str, typer.Argument(metavar="DIR", help="Folder of a campaign.", show_default=False)],
     number: Annotated[
         int,
-        typer.Argument(
-            metavar="NUMBER", min=0, help="The trial, as its table numbers it.", show_default=False
-        ),
+        typer.Argument(metavar="NUMBER", min=0, help="The trial, as its table numbers it.", show_default=False),
     ],
     output: Annotated[
         str | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE.html", help="The page.", show_default="DIR/report/replays/..."
-        ),
+        typer.Option("--output", "-o", metavar="FILE.html", help="The page.", show_default="DIR/report/replays/..."),
     ] = None,
     overwrite: options.Replace = False,
 ) -> None:

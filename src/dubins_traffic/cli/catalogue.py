@@ -73,12 +73,12 @@ class Entry:
             "description": self.line,
             "parameters": [
                 {
-                    "name": own.name,
-                    "required": own.required,
-                    "default": own.default,
-                    "description": own.meaning,
+                    "name": parameter.name,
+                    "required": parameter.required,
+                    "default": parameter.default,
+                    "description": parameter.meaning,
                 }
-                for own in self.parameters
+                for parameter in self.parameters
             ],
             "remarks": list(self.remarks),
         }
@@ -86,7 +86,7 @@ class Entry:
 
 def agents() -> tuple[Entry, ...]:
     """Return the kinds of e-agents."""
-    found: list[Entry] = []
+    entries: list[Entry] = []
     for name, line in agent_names().items():
         parameters = [
             Parameter(
@@ -98,22 +98,22 @@ def agents() -> tuple[Entry, ...]:
             for key, info in KINDS[name].model_fields.items()
         ]
         remarks = () if name in KEEP_E1 else ((UNKNOWN_E1,) if name == REMOTE else (BREAKS_E1,))
-        found.append(Entry(name, line, tuple(parameters), remarks))
-    return tuple(found)
+        entries.append(Entry(name, line, tuple(parameters), remarks))
+    return tuple(entries)
 
 
 def rules() -> tuple[Parameter, ...]:
     """Return the parameters of the rules of the road, in the order of their definition."""
     meanings = _attribute_docs(RuleParameters)
-    found: list[Parameter] = []
-    for own in fields(RuleParameters):
-        text = meanings.get(own.name, "")
-        if own.name.startswith("assume_"):
-            text = f"Whether the problem assumes {own.name.removeprefix('assume_').upper()} of the e-agents, 0 or 1."
-        unit = _unit(own.name)
+    parameters: list[Parameter] = []
+    for field in fields(RuleParameters):
+        text = meanings.get(field.name, "")
+        if field.name.startswith("assume_"):
+            text = f"Whether the problem assumes {field.name.removeprefix('assume_').upper()} of the e-agents, 0 or 1."
+        unit = _unit(field.name)
         meaning = text.rstrip(".") + (f", {unit}" if unit else "")
-        found.append(Parameter(own.name, own.default, False, meaning))
-    return tuple(found)
+        parameters.append(Parameter(field.name, field.default, False, meaning))
+    return tuple(parameters)
 
 
 def configurations() -> tuple[Entry, ...]:
@@ -133,11 +133,11 @@ def simulators() -> tuple[Entry, ...]:
 
 def metrics() -> tuple[Entry, ...]:
     """Return the optional metrics of this and other packages, with the columns that each adds."""
-    found: list[Entry] = []
+    entries: list[Entry] = []
     for name, line in metric_names().items():
-        told = (f"{own.name}: {own.meaning or own.heading}" for own in columns([name]))
-        found.append(Entry(name, line, (), tuple(told)))
-    return tuple(found)
+        told = (f"{column.name}: {column.meaning or column.heading}" for column in columns([name]))
+        entries.append(Entry(name, line, (), tuple(told)))
+    return tuple(entries)
 
 
 def car_models() -> tuple[Entry, ...]:
@@ -161,31 +161,31 @@ def _attribute_docs(kind: type[Any]) -> Mapping[str, str]:
     tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
     body = tree.body if isinstance(tree, ast.ClassDef) else []
     found: dict[str, str] = {}
-    for own, below in pairwise(body):
+    for statement, below in pairwise(body):
         if (
-            isinstance(own, ast.AnnAssign)
-            and isinstance(own.target, ast.Name)
+            isinstance(statement, ast.AnnAssign)
+            and isinstance(statement.target, ast.Name)
             and isinstance(below, ast.Expr)
         ):
             text = below.value.value if isinstance(below.value, ast.Constant) else ""
-            found[own.target.id] = " ".join(str(text).split())
+            found[statement.target.id] = " ".join(str(text).split())
     return found
 
 
 def _line(configuration: Configuration) -> str:
     """Return a configuration as one line of text."""
-    own = configuration.settings
-    goals = _bounds([len(own.goals)] * 2 if own.goals is not None else own.number_goals_bounds)
-    seconds = _bounds([own.duration] * 2 if own.duration is not None else own.duration_bounds)
+    settings = configuration.settings
+    goals = _bounds([len(settings.goals)] * 2 if settings.goals is not None else settings.number_goals_bounds)
+    seconds = _bounds([settings.duration] * 2 if settings.duration is not None else settings.duration_bounds)
     kinds: dict[str, int] = {}
     for planned in configuration.agents:
         kinds[planned.agent.kind] = kinds.get(planned.agent.kind, 0) + 1
     cars = " and ".join(f"{count} {kind}" for kind, count in kinds.items()) or "no e-agents"
-    judged = "judged by the rules of the road" if own.rules else "not judged by the rules"
+    judged = "judged by the rules of the road" if settings.rules else "not judged by the rules"
     parts = (
-        f"{own.number_trials} trials of {seconds} s",
+        f"{settings.number_trials} trials of {seconds} s",
         _roads(configuration),
-        f"{goals} goals" + _apart(own.goal_segments_apart) + _reach(own.goal_round_share),
+        f"{goals} goals" + _apart(settings.goal_segments_apart) + _reach(settings.goal_round_share),
         cars,
         judged,
     )
@@ -203,9 +203,7 @@ def _reach(share: float | None) -> str:
 def _roads(configuration: Configuration) -> str:
     drawn = configuration.settings.network
     if drawn is not None and drawn.random is not None:
-        return (
-            f"random networks of {drawn.random.intersections} intersections and {drawn.random.segments} roads"
-        )
+        return f"random networks of {drawn.random.intersections} intersections and {drawn.random.segments} roads"
     if drawn is not None and drawn.grid is not None:
         return f"grids of {drawn.grid.rows} by {drawn.grid.columns}"
     network = configuration.network

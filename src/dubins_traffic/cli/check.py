@@ -33,22 +33,16 @@ NAMED = re.compile(r"([A-Za-z][\w -]{0,99})=(?!>)(.+)", re.DOTALL)
 """A formula with a name before it: a `=` that is none of the formula's own, as in `=>`."""
 FormulaOption = Annotated[
     list[str] | None,
-    typer.Option(
-        "--formula", metavar="[NAME=]F", help="A formula that is asked of the records, too; again for more."
-    ),
+    typer.Option("--formula", metavar="[NAME=]F", help="A formula that is asked of the records, too; again for more."),
 ]
 
 
 def check(
-    records: Annotated[
-        list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)
-    ],
+    records: Annotated[list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)],
     formula: FormulaOption = None,
     game: Annotated[
         bool,
-        typer.Option(
-            "--game", help="Say whether each trial is a play of the game that `synth` solves, move by move."
-        ),
+        typer.Option("--game", help="Say whether each trial is a play of the game that `synth` solves, move by move."),
     ] = False,
     json: options.Json = False,
 ) -> None:
@@ -88,9 +82,7 @@ def _relation(name: str, record: Record, scored: Score) -> Relation:
     from dubins_traffic.synthesis.related import relate
 
     if scored.verdict is None:
-        raise InputError(
-            "the problem does not ask for the rules, so there is no game", file=name, field="rules"
-        )
+        raise InputError("the problem does not ask for the rules, so there is no game", file=name, field="rules")
     try:
         return relate(record, scored.verdict)
     except InputError as error:
@@ -99,10 +91,10 @@ def _relation(name: str, record: Record, scored: Score) -> Relation:
 
 def _played(relation: Relation) -> str:
     """Return what a trial is as a play of the game, in words."""
-    found = relation.unknown
-    if found is not None:
-        why = f", when {found.breach}" if found.breach else ""
-        play = f"a play of the game until {found.time:.3f} s{why}: {found.move} is no move of it"
+    unknown = relation.unknown
+    if unknown is not None:
+        why = f", when {unknown.breach}" if unknown.breach else ""
+        play = f"a play of the game until {unknown.time:.3f} s{why}: {unknown.move} is no move of it"
     else:
         play = f"a play of the game: {relation.moves} moves"
     return f"{play}; the ego took {relation.longest_move:.1f} s at most for a move that it had"
@@ -135,7 +127,7 @@ def _document(record: str, score: Score, relation: Relation | None) -> dict[str,
         "longest_gap_s": max((goal.longest_gap_s for goal in score.goals), default=None),
     }
     if score.formulas:
-        document["formulas"] = [found.to_json() for found in score.formulas]
+        document["formulas"] = [formula.to_json() for formula in score.formulas]
     if relation is not None:
         document["game"] = relation.to_json()
     return document
@@ -156,8 +148,8 @@ def _show(record: str, ending: Ending | None, score: Score) -> None:
         _show_verdict(record, verdict, console)
     if ending is None or ending.end != End.DURATION:
         console.print(f"  ended early: {'cut off' if ending is None else shown(str(ending))}", markup=False)
-    for found in score.formulas:
-        console.print(f"  {shown(found.name)}: {verdict_text(found)}", markup=False)
+    for formula in score.formulas:
+        console.print(f"  {shown(formula.name)}: {verdict_text(formula)}", markup=False)
     if verdict is not None and verdict.violations:
         console.print(_breaches(verdict))
         first = verdict.violations[0].rule if verdict.excuse is None else verdict.excuse.assumption

@@ -45,9 +45,7 @@ def check_controller(
     ],
     over: Annotated[
         Over | None,
-        typer.Option(
-            "--over", help="C is a program that drives over this, in lockstep.", show_default="none"
-        ),
+        typer.Option("--over", help="C is a program that drives over this, in lockstep.", show_default="none"),
     ] = None,
     sandbox: options.Sandbox = False,
     limits: options.Limits = "",
@@ -114,27 +112,25 @@ def _tabulate(controller: str, *, json: bool) -> None:
             table.add_column(f"{noise * 1e3:g} mm", justify="right")
         for delay in DELAYS:
             cells = [found.cell(delay, noise, loss) for noise in NOISES]
-            texts = [f"{own.clean}/{own.trials} ({own.counted_rounds})" for own in cells]
+            texts = [f"{cell.clean}/{cell.trials} ({cell.counted_rounds})" for cell in cells]
             table.add_row(f"{delay} tick" + "s" * (delay != 1), *texts)
         console.print(table)
 
 
-def _show(found: Checkup) -> None:
+def _show(checkup: Checkup) -> None:
     """Print findings and the histogram of latencies for people."""
     from rich.console import Console
 
     console = Console(highlight=False, soft_wrap=True)
-    for finding in found.findings:
+    for finding in checkup.findings:
         mark = "ok    " if finding.passed else "FAILED"
         console.print(f"{mark} {finding.check}: {finding.detail}", markup=False)
-    if not found.latency_s:
+    if not checkup.latency_s:
         return
-    median, p99, longest = (found.latency_s[name] * 1e3 for name in ("median", "p99", "max"))
-    console.print(
-        f"\nanswers after {median:.3g} ms, 99% of them within {p99:.3g} ms, at most {longest:.3g} ms"
-    )
-    most = max(count for _, count in found.histogram)
-    for edge, count in found.histogram:
+    median, p99, longest = (checkup.latency_s[name] * 1e3 for name in ("median", "p99", "max"))
+    console.print(f"\nanswers after {median:.3g} ms, 99% of them within {p99:.3g} ms, at most {longest:.3g} ms")
+    most = max(count for _, count in checkup.histogram)
+    for edge, count in checkup.histogram:
         label = "longer" if edge is None else f"<= {edge * 1e3:.3g} ms"
         bar = "#" * (40 * count // most)
         console.print(f"  {label:>10} {count:6} {bar}", markup=False)

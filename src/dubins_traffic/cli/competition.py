@@ -27,9 +27,7 @@ VERIFY_EXAMPLES = options.examples(
     "competition verify spring --phase test",
     "competition verify spring --phase test --seeds test.seeds.txt --commitment 5f2c...",
 )
-RANK_EXAMPLES = options.examples(
-    "competition rank spring --phase practice ada=evaluations/a bob=evaluations/b"
-)
+RANK_EXAMPLES = options.examples("competition rank spring --phase practice ada=evaluations/a bob=evaluations/b")
 REHEARSE_EXAMPLES = options.examples("competition rehearse spring --workers 4 --teams 20 --submissions 30")
 
 competition = typer.Typer(
@@ -87,14 +85,14 @@ def seal(
     from dubins_traffic.competition.sealing import make_key_file
 
     sealing.cipher_class()
-    own = _phase(file, phase)
+    phase_there = _phase(file, phase)
     if key_file is not None and not Path(key_file).exists():
-        make_key_file(Path(key_file), own.folder)
+        make_key_file(Path(key_file), phase_there.folder)
         faults.tell(f"{key_file}: a new key")
-    key = _key(own, key_file, confirm=True)
+    key = _key(phase_there, key_file, confirm=True)
     faults.tell("who loses the key, or the passphrase, has no results: keep a copy elsewhere")
-    commitment = sealing.seal(own, key, overwrite=overwrite)
-    options.tell(str(sealing.sealed_path(own)))
+    commitment = sealing.seal(phase_there, key, overwrite=overwrite)
+    options.tell(str(sealing.sealed_path(phase_there)))
     print(f"commitment {commitment}")
 
 
@@ -105,9 +103,9 @@ def open_phase(file: File, phase: PhaseName) -> None:
     from dubins_traffic.competition.competition import load_competition
 
     found = load_competition(file)
-    own = found.phase(phase)
-    published = sealing.publish(own, found.title)
-    options.tell(str(sealing.commitment_path(own)))
+    opened = found.phase(phase)
+    published = sealing.publish(opened, found.title)
+    options.tell(str(sealing.commitment_path(opened)))
     print(f"commitment {published.commitment}")
 
 
@@ -117,8 +115,8 @@ def reveal(file: File, phase: PhaseName, key_file: KeyFile = None) -> None:
     from dubins_traffic.competition import sealing
 
     sealing.cipher_class()
-    own = _phase(file, phase)
-    options.tell(str(sealing.reveal(own, _key(own, key_file))))
+    phase_there = _phase(file, phase)
+    options.tell(str(sealing.reveal(phase_there, _key(phase_there, key_file))))
 
 
 @competition.command("verify", epilog=VERIFY_EXAMPLES)
@@ -127,9 +125,7 @@ def verify(
     phase: PhaseName,
     seeds: Annotated[
         str | None,
-        typer.Option(
-            "--seeds", metavar="FILE", help="The revealed seeds.", show_default="those in the folder"
-        ),
+        typer.Option("--seeds", metavar="FILE", help="The revealed seeds.", show_default="those in the folder"),
     ] = None,
     commitment: Annotated[
         str | None,
@@ -146,11 +142,11 @@ def verify(
     from dubins_traffic.competition.sealing import read_seeds
     from dubins_traffic.files import read_text
 
-    own = _phase(file, phase)
-    path = Path(seeds) if seeds else sealing.revealed_path(own)
-    committed = commitment or sealing.read_published(sealing.commitment_path(own)).commitment
+    phase_there = _phase(file, phase)
+    path = Path(seeds) if seeds else sealing.revealed_path(phase_there)
+    committed = commitment or sealing.read_published(sealing.commitment_path(phase_there)).commitment
     found = read_seeds(read_text(path), str(path))
-    sealing.check_revealed(found, own, committed)
+    sealing.check_revealed(found, phase_there, committed)
     print(f"{path}: {len(found.seeds)} seeds, as committed to")
 
 
@@ -173,13 +169,13 @@ def rank(
     from dubins_traffic.competition.ranking import rank as ranked
     from dubins_traffic.competition.ranking import ranking_document
 
-    own = _phase(file, phase)
-    found = load_entries(entries, own)
-    places = ranked(found, own)
+    phase_there = _phase(file, phase)
+    found = load_entries(entries, phase_there)
+    places = ranked(found, phase_there)
     if json:
-        print(json_text.dumps(ranking_document(found, own), indent=2))
+        print(json_text.dumps(ranking_document(found, phase_there), indent=2))
     else:
-        _show(places, own)
+        _show(places, phase_there)
 
 
 @competition.command("rehearse", epilog=REHEARSE_EXAMPLES)
@@ -188,9 +184,7 @@ def rehearse(
     controllers: Annotated[
         list[str], typer.Option("--controller", metavar="NAME", help="Built-in; may be given several times.")
     ] = ["lanes", "rules", "simple"],  # noqa: B006
-    trials: Annotated[
-        int, typer.Option("--trials", metavar="N", min=1, help="Trials of each configuration.")
-    ] = 4,
+    trials: Annotated[int, typer.Option("--trials", metavar="N", min=1, help="Trials of each configuration.")] = 4,
     workers: Annotated[int, typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.")] = 1,
     teams: Annotated[int, typer.Option("--teams", metavar="N", min=1, help="Teams of the season.")] = 10,
     submissions: Annotated[
@@ -205,16 +199,15 @@ def rehearse(
     from dubins_traffic.competition.rehearsal import rehearse as rehearsed
 
     loads: dict[str, float] = {}
-    for own in rehearsed(load_competition(file), controllers, trials=trials, workers=workers, trust=trust):
-        told = f", ended by {', '.join(own.faults)}" if own.faults else ""
+    for rehearsal in rehearsed(load_competition(file), controllers, trials=trials, workers=workers, trust=trust):
+        told = f", ended by {', '.join(rehearsal.faults)}" if rehearsal.faults else ""
         print(
-            f"{own.phase.name}: {own.controller}: {own.trials} trials, {own.seconds:.2f} s each{told}",
+            f"{rehearsal.phase.name}: {rehearsal.controller}: {rehearsal.trials} trials,"
+            f" {rehearsal.seconds:.2f} s each{told}",
             flush=True,
         )
-        loads[own.phase.name] = max(loads.get(own.phase.name, 0.0), teams * own.load(submissions))
-    print(
-        f"With {teams} teams, each with {submissions} submissions to a phase as slow as the slowest of these:"
-    )
+        loads[rehearsal.phase.name] = max(loads.get(rehearsal.phase.name, 0.0), teams * rehearsal.load(submissions))
+    print(f"With {teams} teams, each with {submissions} submissions to a phase as slow as the slowest of these:")
     for name, seconds in loads.items():
         print(f"  {name}: {_hours(seconds / workers)}")
     print(f"The season's load takes {_hours(sum(loads.values()) / workers)} on {workers} such workers.")
@@ -254,7 +247,7 @@ def _key(phase: Phase, key_file: str | None, *, confirm: bool = False) -> bytes:
 
 def _phase_line(phase: Phase) -> str:
     """Return a phase in a line."""
-    names = ", ".join(own.name for own in phase.configurations)
+    names = ", ".join(configuration.name for configuration in phase.configurations)
     parts = [f"{len(phase.numbers)} trials of {names}", f"shows {phase.shows}"]
     parts.append("secret seeds" if phase.secret else f"seed {phase.model.seed}")
     for word, time in (("opens", phase.opens), ("closes", phase.closes)):
@@ -278,16 +271,16 @@ def _show(places: list[RankedEntry], phase: Phase) -> None:
         "can't be told from",
     ):
         table.add_column(heading, justify="right" if heading in ("place", "mean", "satisfied") else "left")
-    for own in places:
-        ahead = own.to_next
+    for place in places:
+        ahead = place.to_next
         table.add_row(
-            str(own.place),
-            own.entry,
-            f"{own.estimate.mean:.3f}",
-            _interval(own.estimate.mean_interval),
-            f"{own.satisfied.share:.2f}",
+            str(place.place),
+            place.entry,
+            f"{place.estimate.mean:.3f}",
+            _interval(place.estimate.mean_interval),
+            f"{place.satisfied.share:.2f}",
             "" if ahead is None else f"{ahead.mean:.3f} {_interval(ahead.mean_interval)}",
-            ", ".join(own.ties),
+            ", ".join(place.ties),
         )
     Console(highlight=False, markup=False).print(table)
 

@@ -19,9 +19,7 @@ EXAMPLES = options.examples(
     "estimate town --controller rules --event 1.collision --below 0.05 --method splitting",
 )
 
-EventOption = Annotated[
-    str, typer.Option("--event", metavar="RULE", help="The rule that is broken, or nearly.")
-]
+EventOption = Annotated[str, typer.Option("--event", metavar="RULE", help="The rule that is broken, or nearly.")]
 BelowOption = Annotated[
     float, typer.Option("--below", metavar="X", help="How near to it, by its margin; 0: it is broken.")
 ]
@@ -32,9 +30,7 @@ TrialsOption = Annotated[
 ]
 DurationOption = Annotated[
     float | None,
-    typer.Option(
-        "--duration", metavar="S", help="Seconds of a trial.", show_default="as the configuration says"
-    ),
+    typer.Option("--duration", metavar="S", help="Seconds of a trial.", show_default="as the configuration says"),
 ]
 ParticlesOption = Annotated[
     int, typer.Option("--particles", metavar="N", help="Trials that splitting steps at a time.")
@@ -74,25 +70,25 @@ def estimate(
     faults.fail_if(found.fault)
 
 
-def _show(found: Probability) -> None:
+def _show(probability: Probability) -> None:
     """Print an estimate for people."""
-    if found.left_out == found.trials:
-        print(f"{found.event}: no estimate, since all {found.trials} trials ended by a fault")
+    if probability.left_out == probability.trials:
+        print(f"{probability.event}: no estimate, since all {probability.trials} trials ended by a fault")
         return
-    low, high = found.interval
-    print(f"{found.event}: {found.probability:.3g}, 95 % interval {low:.3g} to {high:.3g}")
-    if found.wilson is not None:
-        low, high = found.wilson
-        known = found.trials - found.left_out
-        print(f"{found.events} of {known} trials; Wilson's interval {low:.3g} to {high:.3g}")
-        if found.left_out:
-            print(f"{found.left_out} of {found.trials} trials are left out: they ended by a fault before")
-        if found.discarded:
+    low, high = probability.interval
+    print(f"{probability.event}: {probability.probability:.3g}, 95 % interval {low:.3g} to {high:.3g}")
+    if probability.wilson is not None:
+        low, high = probability.wilson
+        known = probability.trials - probability.left_out
+        print(f"{probability.events} of {known} trials; Wilson's interval {low:.3g} to {high:.3g}")
+        if probability.left_out:
+            print(f"{probability.left_out} of {probability.trials} trials are left out: they ended by a fault before")
+        if probability.discarded:
             faults.tell(
-                f"{found.discarded} trials count as trials without the event: e-agents broke the assumption first"
+                f"{probability.discarded} trials count as trials without the event: e-agents broke the assumption first"
             )
     else:
-        print(f"{found.trials} trials in {len(found.runs)} runs of multilevel splitting")
-    if found.replicas is not None:
-        for sentence in found.replicas.advice:
+        print(f"{probability.trials} trials in {len(probability.runs)} runs of multilevel splitting")
+    if probability.replicas is not None:
+        for sentence in probability.replicas.advice:
             print(sentence)

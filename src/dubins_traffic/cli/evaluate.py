@@ -54,9 +54,7 @@ OutputOption = Annotated[
 ]
 TrustOption = Annotated[
     bool,
-    typer.Option(
-        "--trust-submissions", help="Run it too where this machine can't enforce all limits of the box."
-    ),
+    typer.Option("--trust-submissions", help="Run it too where this machine can't enforce all limits of the box."),
 ]
 
 
@@ -80,23 +78,23 @@ def evaluate(
     from dubins_traffic.competition.submission import EVALUATIONS, check_apart, check_submission
     from dubins_traffic.competition.visibility import summary
 
-    own = _competition(competition).phase(phase)
+    opened = _competition(competition).phase(phase)
     base = Path(output or EVALUATIONS)
     check_apart(Path(path), base)
     submission = check_submission(path, base / "submissions")
     folder = base if output else base / f"{phase}-{submission.digest[:12]}"
     kept = "interrupted; {} of {} trials are kept, the same command goes on".format
-    with faults.interruptible(lambda: kept(judging.kept(folder), len(own.numbers))), progress() as show:
+    with faults.interruptible(lambda: kept(judging.kept(folder), len(opened.numbers))), progress() as show:
         done = judging.evaluate(
-            own, submission, folder, workers=workers, trust=trust, records=records, progress=show
+            opened, submission, folder, workers=workers, trust=trust, records=records, progress=show
         )
     if json:
-        print(json_text.dumps({**done.to_json(), "summary": summary(own, done.results)}, indent=2))
+        print(json_text.dumps({**done.to_json(), "summary": summary(opened, done.results)}, indent=2))
     else:
-        _show(done, own, folder)
-    bad = [own for own in done.results if own.owner is not None]
+        _show(done, opened, folder)
+    bad = [result for result in done.results if result.owner is not None]
     first = f"trial {bad[0].number}: {bad[0].end}: {bad[0].row['reason'] or ''}" if bad else ""
-    faults.fail_if(fault_notice(Counter(own.end for own in bad), len(done.results), first))
+    faults.fail_if(fault_notice(Counter(result.end for result in bad), len(done.results), first))
 
 
 def _competition(place: str) -> Competition:
@@ -119,24 +117,24 @@ def _show(done: Evaluation, phase: Phase, folder: Path) -> None:
     from dubins_traffic.record.sink import BY_CONTROLLER
 
     several = len(phase.configurations) > 1
-    ran = dict.fromkeys(own.ran for own in done.results if own.ran is not None)
+    ran = dict.fromkeys(result.ran for result in done.results if result.ran is not None)
     table = Table(title=", ".join([phase.name, f"submission {done.submission[:12]}", *ran]))
     where = ("configuration",) if several else ()
     for heading in ("trial", *where, "end", "rounds", "counted", "verdict", "collisions", "fault"):
         table.add_column(heading, justify="right" if heading in ("trial", "rounds", "counted") else "left")
-    for own in done.results:
-        place = (phase.place(own.number)[0].name,) if several else ()
-        cells = [own.row[name] for name in ("rounds", "counted_rounds", "verdict", "collisions")]
+    for result in done.results:
+        place = (phase.place(result.number)[0].name,) if several else ()
+        cells = [result.row[name] for name in ("rounds", "counted_rounds", "verdict", "collisions")]
         texts = ["" if cell is None else str(cell) for cell in cells]
-        table.add_row(str(own.number), *place, own.end.replace("_", " "), *texts, own.owner or "")
+        table.add_row(str(result.number), *place, result.end.replace("_", " "), *texts, result.owner or "")
     console = Console(highlight=False, markup=False)
     console.print(table)
-    faulty = [own for own in done.results if own.owner is not None]
+    faulty = [result for result in done.results if result.owner is not None]
     if faulty:
         console.print(tail(faulty[0].log, phase.model.log_lines))
     means = summary(phase, done.results) or {"trials": 0}
     told = ", ".join(f"{name} {value:.4g}" for name, value in means.items() if name != "trials")
-    quits = sum(own.end in BY_CONTROLLER for own in done.results)
+    quits = sum(result.end in BY_CONTROLLER for result in done.results)
     ended = f", {quits} ended by the controller" if quits else ""
     console.print(f"means of {means['trials']} trials{ended}: {told}")
     options.tell(str(folder / "results.jsonl"))

@@ -15,9 +15,7 @@ WIDTH = 80
 def explain(
     name: Annotated[
         str | None,
-        typer.Argument(
-            metavar="[RULE]", help="What a breach or a message names, such as 3.stop.", show_default=False
-        ),
+        typer.Argument(metavar="[RULE]", help="What a breach or a message names, such as 3.stop.", show_default=False),
     ] = None,
 ) -> None:
     """Say what a rule means: in plain words, and as the norm has it. Without a name: all rules in a line each."""

@@ -41,14 +41,10 @@ FormulaOption = Annotated[
     str | None,
     typer.Option("--formula", metavar="F", help="A formula of your own that is asked for instead."),
 ]
-LeastOption = Annotated[
-    bool, typer.Option("--least-score", help="Look for the trials of the least score instead.")
-]
+LeastOption = Annotated[bool, typer.Option("--least-score", help="Look for the trials of the least score instead.")]
 TrialsOption = Annotated[
     int | None,
-    typer.Option(
-        "--trials", metavar="N", min=1, help="How many trials.", show_default="10000 without --seconds"
-    ),
+    typer.Option("--trials", metavar="N", min=1, help="How many trials.", show_default="10000 without --seconds"),
 ]
 SecondsOption = Annotated[
     float | None, typer.Option("--seconds", metavar="S", min=0, help="End after so many seconds.")
@@ -64,9 +60,7 @@ StrategyOption = Annotated[
 DurationOption = Annotated[
     float, typer.Option("--duration", metavar="S", help="Seconds of a trial; 0: as the configuration says.")
 ]
-RayOption = Annotated[
-    str | None, typer.Option("--ray", metavar="ADDRESS", help="Run on a Ray cluster, or `local`.")
-]
+RayOption = Annotated[str | None, typer.Option("--ray", metavar="ADDRESS", help="Run on a Ray cluster, or `local`.")]
 WorkersOption = Annotated[int, typer.Option("--workers", metavar="W", min=1, help="Processes.")]
 FolderOption = Annotated[
     str, typer.Option("--output", "-o", metavar="DIR", help="Folder for what is found, made if missing.")
@@ -121,9 +115,9 @@ def falsify(
         progress(trials) as tell,
     ):
 
-        def heard(own: Search) -> None:
-            seen[:] = [own]
-            tell(own.finished, trials or own.finished)
+        def heard(going: Search) -> None:
+            seen[:] = [going]
+            tell(going.finished, trials or going.finished)
 
         found = search(
             configuration, driver, output, rules=rule or (), formula=formula, least_score=least_score,
@@ -136,9 +130,7 @@ def falsify(
 
 
 @contextlib.contextmanager
-def driven(
-    controller: str, over: str | None, *, shield: bool, sandbox: str | None = None
-) -> Generator[str | Remote]:
+def driven(controller: str, over: str | None, *, shield: bool, sandbox: str | None = None) -> Generator[str | Remote]:
     """Yield who drives: a controller by its name, or a program elsewhere over a transport."""
     from dubins_traffic.controllers.registry import dressed
 
@@ -154,9 +146,7 @@ def driven(
 
 
 def shrink(
-    case: Annotated[
-        str, typer.Argument(metavar="CASE", help="A case that falsify has kept.", show_default=False)
-    ],
+    case: Annotated[str, typer.Argument(metavar="CASE", help="A case that falsify has kept.", show_default=False)],
     controller: Annotated[
         str | None,
         typer.Option(
@@ -168,9 +158,7 @@ def shrink(
     ] = None,
     output: Annotated[
         str | None,
-        typer.Option(
-            "--output", "-o", metavar="FILE.json", help="The small case.", show_default="CASE.small.json"
-        ),
+        typer.Option("--output", "-o", metavar="FILE.json", help="The small case.", show_default="CASE.small.json"),
     ] = None,
     overwrite: options.Replace = False,
     over: OverOption = None,
@@ -212,14 +200,14 @@ def regress(
     with driven(controller, over, shield=shield) as driver:
         found = run(folder, driver)
     if json:
-        print(json_text.dumps([own.to_json() for own in found], indent=2))
+        print(json_text.dumps([case.to_json() for case in found], indent=2))
     else:
-        for own in found:
-            print(f"{own.file.name}: {own.sentence or own.fault or own.verdict}")
-        faulty = sum(bool(own.fault) for own in found)
+        for case in found:
+            print(f"{case.file.name}: {case.sentence or case.fault or case.verdict}")
+        faulty = sum(bool(case.fault) for case in found)
         ended = f", {faulty} ended by a fault" if faulty else ""
-        print(f"{sum(own.passed for own in found)} of {len(found)} cases passed{ended}")
-    if not all(own.passed for own in found):
+        print(f"{sum(case.passed for case in found)} of {len(found)} cases passed{ended}")
+    if not all(case.passed for case in found):
         raise typer.Exit(faults.FAILED)
 
 

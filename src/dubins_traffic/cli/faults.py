@@ -216,9 +216,7 @@ def _verdict(error: Exception, arguments: Sequence[str]) -> tuple[str, int]:
     if isinstance(error, typer.TyperException):
         return error.format_message() + _given(error, arguments), WRONG_INPUT
     if isinstance(error, OSError) and error.strerror:
-        names = [
-            os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)
-        ]
+        names = [os.fsdecode(name) for name in (error.filename, error.filename2) if isinstance(name, str | bytes)]
         return ": ".join([*names, error.strerror]), WRONG_INPUT
     hint = f"`{PROGRAM} --debug ...` shows where; please report it"
     return f"unexpected {type(error).__name__}: {error} ({hint})", FAILED

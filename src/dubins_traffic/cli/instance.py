@@ -18,9 +18,7 @@ EXAMPLES = options.examples(
 def instance(
     config: options.Config,
     seed: options.Seed = 0,
-    trial: Annotated[
-        int, typer.Option("--trial", metavar="I", min=0, help="Number of the trial, from 0.")
-    ] = 0,
+    trial: Annotated[int, typer.Option("--trial", metavar="I", min=0, help="Number of the trial, from 0.")] = 0,
     full: Annotated[
         bool,
         typer.Option("--full", help="Version 1, with starts, duration, e-agents and seed: it can be run."),

@@ -70,11 +70,11 @@ def _print_parameters(parameters: Sequence[Parameter], indent: str) -> None:
     """Print a line for each parameter: name, default, meaning."""
     if not parameters:
         return
-    first = max(len(own.name) for own in parameters)
-    second = max(len(own.shown) for own in parameters)
-    for own in parameters:
-        head = f"{indent}{own.name:{first}}  {own.shown:{second}}  "
-        lines = textwrap.wrap(own.meaning, max(40, WIDTH - len(head))) or [""]
+    first = max(len(parameter.name) for parameter in parameters)
+    second = max(len(parameter.shown) for parameter in parameters)
+    for parameter in parameters:
+        head = f"{indent}{parameter.name:{first}}  {parameter.shown:{second}}  "
+        lines = textwrap.wrap(parameter.meaning, max(40, WIDTH - len(head))) or [""]
         print((head + lines[0]).rstrip())
         for line in lines[1:]:
             print(" " * len(head) + line)

@@ -57,8 +57,8 @@ def imported(
     settings = ImportSettings(
         w=W if w is None else w, scale=scale, tolerance=tolerance, pairs=0.0 if pairs is None else pairs
     )
-    own = scale is not None and w is None
-    document, losses = form.reduced(text, file, settings, own_lanes=own, part=part)
+    keeps_lanes = scale is not None and w is None
+    document, losses = form.reduced(text, file, settings, own_lanes=keeps_lanes, part=part)
     network = RoadNetwork.from_document(document, file)
     if part is not None:
         require_loop(network, losses, part, file)
@@ -85,12 +85,10 @@ def require_no_map_options(
     pairs: float | None = None,
 ) -> None:
     """Refuse what only a map of another program allows where the network in `source` comes from none."""
-    own = str(part).partition(" ")[0]
-    for name, given in (("--scale", scale), ("--w", w), (own, part), ("--pairs", pairs)):
+    part_option = str(part).partition(" ")[0]
+    for name, given in (("--scale", scale), ("--w", w), (part_option, part), ("--pairs", pairs)):
         if given is not None:
-            raise InputError(
-                "nothing to reduce", file=name, value=source, expected="--from a map of another program"
-            )
+            raise InputError("nothing to reduce", file=name, value=source, expected="--from a map of another program")
 
 
 @contextmanager
@@ -117,9 +115,7 @@ def require_outputs(
     `others` are what is read, and what else is written.
     """
     if outputs and _losses(network) is None:
-        raise InputError(
-            "nothing to tell", file="--losses", value=outputs[0], expected="a map of another program"
-        )
+        raise InputError("nothing to tell", file="--losses", value=outputs[0], expected="a map of another program")
     _require(outputs or [], *others, overwrite=overwrite)
 
 

@@ -14,9 +14,7 @@ LCM_EXAMPLES = options.examples("lcm messages -o dubins_traffic_lcm.lcm")
 
 
 def ros1(
-    folder: Annotated[
-        Path, typer.Argument(metavar="DIR", help="Where to write, made if missing.", show_default=False)
-    ],
+    folder: Annotated[Path, typer.Argument(metavar="DIR", help="Where to write, made if missing.", show_default=False)],
     cpp: Annotated[bool, typer.Option("--cpp", help="C++ headers instead of Python packages.")] = False,
     overwrite: options.Replace = False,
 ) -> None:

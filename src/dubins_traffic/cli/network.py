@@ -35,9 +35,7 @@ IntersectionsOption = Annotated[
 ]
 SegmentsOption = Annotated[
     int | None,
-    typer.Option(
-        "--segments", metavar="M", help="With --intersections: M segments, N-1 up to floor(2N - 2 sqrt N)."
-    ),
+    typer.Option("--segments", metavar="M", help="With --intersections: M segments, N-1 up to floor(2N - 2 sqrt N)."),
 ]
 GridOption = Annotated[
     tuple[int, int] | None,
@@ -59,9 +57,7 @@ SourceOption = Annotated[
 ]
 ScaleOption = Annotated[
     float | None,
-    typer.Option(
-        "--scale", metavar="K", help="Metres of it for a metre of the map.", show_default="a lane is 2w wide"
-    ),
+    typer.Option("--scale", metavar="K", help="Metres of it for a metre of the map.", show_default="a lane is 2w wide"),
 ]
 WidthOption = Annotated[
     float | None,
@@ -127,17 +123,13 @@ def network(
     from dubins_traffic.roads.network import RoadNetwork
 
     suffixes = packed(*SUFFIXES[format])
-    options.require(
-        output, "a road network", suffixes, overwrite=overwrite, apart_from=[source], standard=True
-    )
+    options.require(output, "a road network", suffixes, overwrite=overwrite, apart_from=[source], standard=True)
     part = maps.part_asked(clip, around)
     if source is None:
         maps.require_no_map_options(None, scale, w, part, pairs)
     if source is not None:
         if (intersections, segments, grid) != (None, None, None):
-            raise InputError(
-                "two networks at once", file="--from", value=source, expected="nothing else beside it"
-            )
+            raise InputError("two networks at once", file="--from", value=source, expected="nothing else beside it")
         with maps.telling(losses, source, output, overwrite=overwrite):
             made = maps.imported(source, scale, w, tolerance, part, pairs)
     elif intersections is None and segments is None:

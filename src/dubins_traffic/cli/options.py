@@ -57,9 +57,7 @@ Config = Annotated[
 ]
 Trials = Annotated[
     int | None,
-    typer.Option(
-        "--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"
-    ),
+    typer.Option("--trials", metavar="N", min=1, help="Trials 0 to N-1.", show_default="as the configuration says"),
 ]
 Controller = Annotated[
     str,
@@ -75,14 +73,10 @@ Output = Annotated[
     str | None,
     typer.Option("--output", "-o", metavar="FILE", help="Write here instead of to standard output."),
 ]
-Replace = Annotated[
-    bool, typer.Option("--overwrite", help="Replace a file that exists; by default it is refused.")
-]
+Replace = Annotated[bool, typer.Option("--overwrite", help="Replace a file that exists; by default it is refused.")]
 Shield = Annotated[
     bool,
-    typer.Option(
-        "--shield", help="Change the ego's commands as little as needed for it to keep rules 1 to 3."
-    ),
+    typer.Option("--shield", help="Change the ego's commands as little as needed for it to keep rules 1 to 3."),
 ]
 Sandbox = Annotated[
     bool, typer.Option("--sandbox", help="Run the controller in a box; none of its code is loaded here.")
@@ -110,9 +104,7 @@ Metrics = Annotated[
 ]
 Workers = Annotated[
     int | None,
-    typer.Option(
-        "--workers", metavar="N", min=1, max=1024, help="Processes.", show_default="one for each core"
-    ),
+    typer.Option("--workers", metavar="N", min=1, max=1024, help="Processes.", show_default="one for each core"),
 ]
 Resume = Annotated[bool, typer.Option("--resume", help="Go on with the run that was begun in DIR.")]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON for machines instead of a table.")]
@@ -127,9 +119,7 @@ Data = Annotated[
 ]
 DataOver = Annotated[
     str | None,
-    typer.Option(
-        "--overwrite-trial-data", "-F", metavar="DATA", help="The same, overwriting one that exists."
-    ),
+    typer.Option("--overwrite-trial-data", "-F", metavar="DATA", help="The same, overwriting one that exists."),
 ]
 Network = Annotated[
     str | None,
@@ -140,9 +130,7 @@ Records = Annotated[
 ]
 Overwrite = Annotated[
     bool,
-    typer.Option(
-        "--overwrite", help="Remove the records that DIR holds first; by default such a DIR is refused."
-    ),
+    typer.Option("--overwrite", help="Remove the records that DIR holds first; by default such a DIR is refused."),
 ]
 Append = Annotated[
     bool,
@@ -160,9 +148,7 @@ Source = Annotated[
         autocompletion=shipped,
     ),
 ]
-Pace = Annotated[
-    float, typer.Option("--pace", metavar="X", help="Seconds of the trial in a second, in the page.")
-]
+Pace = Annotated[float, typer.Option("--pace", metavar="X", help="Seconds of the trial in a second, in the page.")]
 Port = Annotated[
     int,
     typer.Option(
@@ -174,9 +160,7 @@ Port = Annotated[
         show_default="one that is free",
     ),
 ]
-NoBrowser = Annotated[
-    bool, typer.Option("--no-browser", help="Print the address of the page, and open no browser.")
-]
+NoBrowser = Annotated[bool, typer.Option("--no-browser", help="Print the address of the page, and open no browser.")]
 Record = Annotated[str, typer.Argument(metavar="RECORD", help="A record, `*.mcap`.", show_default=False)]
 
 

@@ -74,7 +74,7 @@ def play(
         if record is not None and record.exists():
             options.tell(str(record))
         raise
-    show(ScoreSheet(tuple(own.score for own in standings)), json=json)
+    show(ScoreSheet(tuple(standing.score for standing in standings)), json=json)
     options.tell(playing.sentence(standings), *([] if output is None else [output]))
 
 
@@ -85,10 +85,10 @@ def _instance(source: str, rnd: str | None, seed: int, trial: int) -> Instance:
     from dubins_traffic.record.reader import Record
     from dubins_traffic.runs.plan import load_runnable
 
-    found = load_runnable(source, rnd=rnd, seed=seed)
-    if isinstance(found, Record):
-        return found.instance
-    if isinstance(found, Configuration):
-        maps.report(found.network)
-        return draw(found, seed, trial)
-    return found
+    runnable = load_runnable(source, rnd=rnd, seed=seed)
+    if isinstance(runnable, Record):
+        return runnable.instance
+    if isinstance(runnable, Configuration):
+        maps.report(runnable.network)
+        return draw(runnable, seed, trial)
+    return runnable

@@ -19,9 +19,7 @@ EXAMPLES = options.examples(
 def plot(
     file: Annotated[
         str,
-        typer.Argument(
-            metavar="FILE", help="A network, an instance or a record; `-` reads it.", show_default=False
-        ),
+        typer.Argument(metavar="FILE", help="A network, an instance or a record; `-` reads it.", show_default=False),
     ],
     output: Annotated[
         str | None,

@@ -72,9 +72,7 @@ def replay(
     ] = None,
     at: Annotated[
         float | None,
-        typer.Option(
-            "--at", metavar="S", help="The second at which the page begins.", show_default="its first"
-        ),
+        typer.Option("--at", metavar="S", help="The second at which the page begins.", show_default="its first"),
     ] = None,
     overwrite: options.Replace = False,
 ) -> None:

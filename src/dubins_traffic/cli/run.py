@@ -59,9 +59,7 @@ SimulatorOption = Annotated[
         autocompletion=options.simulators,
     ),
 ]
-WatchOption = Annotated[
-    bool, typer.Option("--watch", help="Show the trials in a page of the browser as they run.")
-]
+WatchOption = Annotated[bool, typer.Option("--watch", help="Show the trials in a page of the browser as they run.")]
 GuiOption = Annotated[
     bool, typer.Option("--gui", help="Show trials as they run in Gazebo's window, at the clock's pace.")
 ]
@@ -123,7 +121,7 @@ def run(
         if todo.before:
             faults.tell(f"{todo.before} trials have their records in {records}; {len(todo.jobs)} are left")
         results, lost = _run(todo, jobs, records, stage, json=json)
-    is_sound = faults.tell_failed([(own.instance, own.ending) for own in results])
+    is_sound = faults.tell_failed([(result.instance, result.ending) for result in results])
     if lost is not None:
         faults.tell(str(lost))
     if lost is not None or not is_sound:

@@ -14,9 +14,7 @@ EXAMPLES = options.examples(
 
 
 def score(
-    records: Annotated[
-        list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)
-    ],
+    records: Annotated[list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)],
     metric: options.Metrics = None,
     json: options.Json = False,
 ) -> None:

@@ -20,9 +20,7 @@ EXAMPLES = options.examples(
 WorkersOption = Annotated[
     int, typer.Option("--workers", metavar="N", min=0, help="Workers beside the server, on this machine.")
 ]
-PortOption = Annotated[
-    int, typer.Option("--port", metavar="P", min=0, max=65535, help="Port; 0: any that is free.")
-]
+PortOption = Annotated[int, typer.Option("--port", metavar="P", min=0, max=65535, help="Port; 0: any that is free.")]
 CompetitionOption = Annotated[
     list[str] | None,
     typer.Option(
@@ -42,9 +40,7 @@ KeyFileOption = Annotated[
 ]
 TrustOption = Annotated[
     bool,
-    typer.Option(
-        "--trust-submissions", help="Run submissions also where this machine can't enforce every limit."
-    ),
+    typer.Option("--trust-submissions", help="Run submissions also where this machine can't enforce every limit."),
 ]
 
 

@@ -32,9 +32,7 @@ Remote = Annotated[
     typer.Option("--remote", metavar="NAME", help="An e-agent that is driven elsewhere; may be repeated."),
 ]
 Endless = Annotated[bool, typer.Option("--endless", help="Run trials until interrupted.")]
-Lockstep = Annotated[
-    bool, typer.Option("--lockstep", help="Wait for a command of every remote car in each tick.")
-]
+Lockstep = Annotated[bool, typer.Option("--lockstep", help="Wait for a command of every remote car in each tick.")]
 Factor = Annotated[
     float, typer.Option("--factor", metavar="F", help="Speed of simulated time relative to the wall clock.")
 ]
@@ -43,9 +41,7 @@ Deadline = Annotated[
 ]
 Begin = Annotated[
     float,
-    typer.Option(
-        "--begin", metavar="SECONDS", help="Longest wait for the first command after the announcement."
-    ),
+    typer.Option("--begin", metavar="SECONDS", help="Longest wait for the first command after the announcement."),
 ]
 Silence = Annotated[
     float,
@@ -102,9 +98,7 @@ def app(name: str, entry: TransportEntry) -> typer.Typer:
     """Return the command of a transport, with its `run`."""
     made = typer.Typer(help=entry.line, no_args_is_help=True)
     settings = {"allow_extra_args": True} if entry.remappings else None
-    made.command("run", epilog=options.examples(*entry.examples), context_settings=settings)(
-        command(name, entry)
-    )
+    made.command("run", epilog=options.examples(*entry.examples), context_settings=settings)(command(name, entry))
     return made
 
 
@@ -133,23 +127,19 @@ def command(name: str, entry: TransportEntry) -> Callable[..., None]:
     return run
 
 
-def _parameter(own: Option) -> Parameter:
+def _parameter(option: Option) -> Parameter:
     """Return an option of a transport as a parameter for Typer."""
-    kind: Any = own.kind if own.default is not None else own.kind | None
-    shown: Any = {} if own.shown is None else {"show_default": own.shown}
-    said = typer.Option(own.flag, metavar=own.metavar, min=own.low, max=own.high, help=own.help, **shown)
-    return Parameter(
-        own.parameter, Parameter.KEYWORD_ONLY, default=own.default, annotation=Annotated[kind, said]
-    )
+    kind: Any = option.kind if option.default is not None else option.kind | None
+    shown: Any = {} if option.shown is None else {"show_default": option.shown}
+    said = typer.Option(option.flag, metavar=option.metavar, min=option.low, max=option.high, help=option.help, **shown)
+    return Parameter(option.parameter, Parameter.KEYWORD_ONLY, default=option.default, annotation=Annotated[kind, said])
 
 
 def _check_remappings(name: str, arguments: list[str]) -> None:
     """Let what roslaunch adds to a command line pass: `__name:=...`, `__log:=...`."""
     for argument in arguments:
         if ":=" not in argument:
-            raise InputError(
-                "not an argument", file=f"{name} run", value=argument, expected="name:=value at most"
-            )
+            raise InputError("not an argument", file=f"{name} run", value=argument, expected="name:=value at most")
 
 
 def run_session(todo: SessionPlan, session: Iterable[Result], *, json: bool) -> None:

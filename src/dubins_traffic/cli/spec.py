@@ -84,9 +84,7 @@ def spec(
     if period is not None and not 0.0 < period < math.inf:
         raise InputError("not a period", field="--period", value=period, expected="seconds > 0")
     suffixes = PLAIN if format is None else SUFFIXES.get(format, PLAIN)
-    options.require(
-        output, "a specification", suffixes, overwrite=overwrite, apart_from=[instance], standard=True
-    )
+    options.require(output, "a specification", suffixes, overwrite=overwrite, apart_from=[instance], standard=True)
     found = _instance(instance)
     try:
         whole = task(found.problem, found.names)
@@ -177,9 +175,7 @@ def _parts(spec: Specification) -> Iterator[tuple[Formula, Specification]]:
         yield formula, type(spec)(*sides, inputs, tuple(name for name in names if name in outputs))
 
 
-def _refusal(
-    error: FormulaError, whole: FormulaError, formula: Formula, format: Format, source: str
-) -> InputError:
+def _refusal(error: FormulaError, whole: FormulaError, formula: Formula, format: Format, source: str) -> InputError:
     """Return what to say of a formula that can't be said, given what would have to change for the whole."""
     from dubins_traffic.logic.formula import to_spin
 

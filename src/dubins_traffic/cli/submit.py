@@ -18,9 +18,7 @@ STATUS_EXAMPLES = options.examples("status https://compete.example.org/s/7")
 LOGS_EXAMPLES = options.examples("logs https://compete.example.org/s/7")
 CANCEL_EXAMPLES = options.examples("cancel https://compete.example.org/s/7")
 
-Address = Annotated[
-    str, typer.Argument(metavar="URL", help="Address of a submission's page.", show_default=False)
-]
+Address = Annotated[str, typer.Argument(metavar="URL", help="Address of a submission's page.", show_default=False)]
 TokenFile = Annotated[
     str | None,
     typer.Option(
@@ -34,9 +32,7 @@ TokenFile = Annotated[
 
 def submit(
     path: Annotated[str, typer.Argument(metavar="PATH", help="As for [b]evaluate[/b].", show_default=False)],
-    to: Annotated[
-        str, typer.Option("--to", metavar="URL", help="Address of a phase's page.", show_default=False)
-    ],
+    to: Annotated[str, typer.Option("--to", metavar="URL", help="Address of a phase's page.", show_default=False)],
     token_file: TokenFile = None,
     wait: Annotated[bool, typer.Option("--wait", help="Wait until it has ended.")] = False,
     json: options.Json = False,
@@ -69,10 +65,10 @@ def logs(url: Address, token_file: TokenFile = None, json: options.Json = False)
     if json:
         print(json_text.dumps(told, indent=2))
         return
-    for own in told.get("trials", [{"number": None, "log": told.get("log", "")}]):
-        if own["number"] is not None:
-            print(f"trial {own['number']}")
-        for line in str(own["log"]).splitlines():
+    for entry in told.get("trials", [{"number": None, "log": told.get("log", "")}]):
+        if entry["number"] is not None:
+            print(f"trial {entry['number']}")
+        for line in str(entry["log"]).splitlines():
             print(f"  {shown(line)}")
 
 

@@ -30,9 +30,7 @@ suite = typer.Typer(
     help="Frozen sets of problems under a name, and results that can be compared.", no_args_is_help=True
 )
 
-Name = Annotated[
-    str, typer.Argument(metavar="NAME", help="A shipped suite, or a suite's file.", show_default=False)
-]
+Name = Annotated[str, typer.Argument(metavar="NAME", help="A shipped suite, or a suite's file.", show_default=False)]
 
 
 @suite.command("list", epilog=LIST_EXAMPLES)
@@ -42,12 +40,12 @@ def list_suites(json: options.Json = False) -> None:
 
     found = [load_suite(name) for name in shipped_suites()]
     if json:
-        entries = [{"name": own.name, "hash": own.hash, "title": own.model.title} for own in found]
+        entries = [{"name": suite.name, "hash": suite.hash, "title": suite.model.title} for suite in found]
         print(json_text.dumps({"suites": entries}, indent=2))
         return
-    width = max(len(own.label) for own in found)
-    for own in found:
-        print(f"{own.label:{width}}  {own.model.title}")
+    width = max(len(suite.label) for suite in found)
+    for listed in found:
+        print(f"{listed.label:{width}}  {listed.model.title}")
 
 
 @suite.command("show", epilog=SHOW_EXAMPLES)
@@ -65,28 +63,28 @@ def show(name: Name, json: options.Json = False) -> None:
     print("\n".join(_contents(found)))
 
 
-def _contents(found: Suite) -> list[str]:
+def _contents(suite: Suite) -> list[str]:
     """Return what is in a suite, a line each."""
-    if found.model.cases is not None:
-        return [f"  {case.name}" for case in found.model.cases]
-    if found.model.campaign is None:
+    if suite.model.cases is not None:
+        return [f"  {case.name}" for case in suite.model.cases]
+    if suite.model.campaign is None:
         return [
             f"  {game.name}: {game.positions:,} positions, the ego wins from {game.winning:,}"
-            for game in found.model.games or ()
+            for game in suite.model.games or ()
         ]
-    campaign = found.campaign(["simple"])
+    campaign = suite.campaign(["simple"])
     names = ", ".join(dict.fromkeys(cell.configuration for cell in campaign.cells))
-    varied = [f"  {factor}: {', '.join(_values(found, factor))}" for factor in campaign.factors]
+    varied = [f"  {factor}: {', '.join(_values(suite, factor))}" for factor in campaign.factors]
     return [
-        f"{campaign.total} trials of each controller: {found.trials} of {len(campaign.cells)} combinations",
+        f"{campaign.total} trials of each controller: {suite.trials} of {len(campaign.cells)} combinations",
         f"  configurations: {names}",
         *varied,
-        f"page of {', '.join(found.controllers)}",
+        f"page of {', '.join(suite.controllers)}",
     ]
 
 
-def _values(found: Suite, factor: str) -> list[str]:
-    cells = found.campaign(["simple"]).cells
+def _values(suite: Suite, factor: str) -> list[str]:
+    cells = suite.campaign(["simple"]).cells
     return list(dict.fromkeys(str(cell.values[factor]) for cell in cells))
 
 
@@ -130,9 +128,7 @@ SolverOption = Annotated[
 ]
 SecondsOption = Annotated[
     float,
-    typer.Option(
-        "--seconds", metavar="S", min=0.001, max=1e6, help="Longest time of that command for one game."
-    ),
+    typer.Option("--seconds", metavar="S", min=0.001, max=1e6, help="Longest time of that command for one game."),
 ]
 
 
@@ -179,11 +175,11 @@ def run(
 
 
 def _check_options(
-    found: Suite, controllers: list[str] | None, trials: int | None, workers: int | None, solver: str | None
+    suite: Suite, controllers: list[str] | None, trials: int | None, workers: int | None, solver: str | None
 ) -> None:
     """Refuse options that say nothing for a suite of this kind."""
     given = {"--controller": controllers, "--trials": trials, "--workers": workers, "--solver": solver}
-    kind = "games" if found.model.games else "cases" if found.model.cases else "trials"
+    kind = "games" if suite.model.games else "cases" if suite.model.cases else "trials"
     known = {
         "trials": ("--controller", "--trials", "--workers"),
         "cases": ("--controller", "--workers"),
@@ -191,13 +187,11 @@ def _check_options(
     }
     for option, value in given.items():
         if value is not None and option not in known[kind]:
-            raise InputError(
-                f"nothing for a suite of {kind}", file=option, value=value, expected="no such option"
-            )
+            raise InputError(f"nothing for a suite of {kind}", file=option, value=value, expected="no such option")
 
 
 def _trials(
-    found: Suite,
+    suite: Suite,
     folder: Path,
     controllers: list[str],
     trials: int | None,
@@ -210,17 +204,15 @@ def _trials(
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.suites.running import run_suite
 
-    faults.warn(short_notice(found.campaign(["simple"]).first_trials()))
+    faults.warn(short_notice(suite.campaign(["simple"]).first_trials()))
     with (
         faults.interruptible(lambda: f"interrupted; {kept(folder)} trials are kept, --resume goes on"),
         progress() as tell,
     ):
-        return run_suite(
-            found, folder, controllers, trials=trials, workers=workers, resume=resume, progress=tell
-        )
+        return run_suite(suite, folder, controllers, trials=trials, workers=workers, resume=resume, progress=tell)
 
 
-def _cases(found: Suite, folder: Path, controllers: list[str], workers: int | None, *, resume: bool) -> Path:
+def _cases(suite: Suite, folder: Path, controllers: list[str], workers: int | None, *, resume: bool) -> Path:
     import os
 
     from dubins_traffic.cli.progress import progress
@@ -233,21 +225,21 @@ def _cases(found: Suite, folder: Path, controllers: list[str], workers: int | No
         faults.interruptible(lambda: "interrupted; the cases that are finished are kept, --resume goes on"),
         progress() as tell,
     ):
-        return run_cases(found, folder, controllers, workers=count, resume=resume, progress=tell)
+        return run_cases(suite, folder, controllers, workers=count, resume=resume, progress=tell)
 
 
-def _games(found: Suite, folder: Path, solver: str | None, seconds: float, *, resume: bool) -> Path:
+def _games(suite: Suite, folder: Path, solver: str | None, seconds: float, *, resume: bool) -> Path:
     from dubins_traffic.cli.progress import progress
     from dubins_traffic.suites.running import Solver, check_command, run_games
 
     if solver is not None:
         check_command(solver)
-    own = Solver() if solver is None else Solver(solver.split()[0], solver, seconds)
+    asked = Solver() if solver is None else Solver(solver.split()[0], solver, seconds)
     with (
         faults.interruptible(lambda: "interrupted; the answers that are there are kept, --resume goes on"),
         progress() as tell,
     ):
-        return run_games(found, folder, own, resume=resume, progress=tell)
+        return run_games(suite, folder, asked, resume=resume, progress=tell)
 
 
 @suite.command("compare", epilog=COMPARE_EXAMPLES)

@@ -95,18 +95,12 @@ CounterTrialOption = Annotated[
         help="Write the instance in which the e-agents drive by that play, `*.json`, for `run`.",
     ),
 ]
-ExplainOption = Annotated[
-    bool, typer.Option("--explain", help="Say why, and what to assume if the ego does not win.")
-]
+ExplainOption = Annotated[bool, typer.Option("--explain", help="Say why, and what to assume if the ego does not win.")]
 MemoryOption = Annotated[
     int | None,
-    typer.Option(
-        "--memory", metavar="MIB", min=1, help="Most memory to use.", show_default="half of the machine's"
-    ),
+    typer.Option("--memory", metavar="MIB", min=1, help="Most memory to use.", show_default="half of the machine's"),
 ]
-TrialOption = Annotated[
-    int, typer.Option("--trial", metavar="I", min=0, help="Which trial of a configuration.")
-]
+TrialOption = Annotated[int, typer.Option("--trial", metavar="I", min=0, help="Which trial of a configuration.")]
 
 
 def synth(
@@ -229,9 +223,7 @@ def _instance(source: str, seed: int, trial: int) -> Instance:
         return found.instance
     if isinstance(found, Instance):
         return found
-    raise InputError(
-        "has no goals", file=source, expected="a trials configuration, a problem instance or a record"
-    )
+    raise InputError("has no goals", file=source, expected="a trials configuration, a problem instance or a record")
 
 
 @contextmanager

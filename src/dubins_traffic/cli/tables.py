@@ -57,9 +57,7 @@ def _counted(score: Score) -> str:
 
 
 def _mean_before_breach(sheet: ScoreSheet) -> str:
-    return (
-        f"{math.fsum(score.rounds_before_breach for score in sheet.trials) / max(1, len(sheet.trials)):.2f}"
-    )
+    return f"{math.fsum(score.rounds_before_breach for score in sheet.trials) / max(1, len(sheet.trials)):.2f}"
 
 
 def _breaches(score: Score) -> str:
@@ -98,9 +96,7 @@ COLUMNS: dict[str, Column] = {
     "goals visited": Column(lambda score: f"{score.goals_visited:.0%}", spare=1),
     "collisions": Column(lambda score: str(len(score.collisions))),
     "at fault": Column(lambda score: str(sum(collision.at_fault for collision in score.collisions)), spare=3),
-    "off road": Column(
-        lambda score: f"{score.driven.off_road_s:.1f} s", lambda scores: not _is_judged(scores)
-    ),
+    "off road": Column(lambda score: f"{score.driven.off_road_s:.1f} s", lambda scores: not _is_judged(scores)),
     "driven": Column(lambda score: f"{score.driven.distance_m:.1f} m", spare=4),
     "least gap": Column(
         lambda score: "-" if score.min_clearance_m is None else f"{score.min_clearance_m:.2f} m", spare=5
@@ -141,14 +137,14 @@ def summary(score: Score) -> dict[str, str]:
     return {
         "controller": score.controller or "-",
         **{heading: column.cell(score) for heading, column in _needed([score]).items()},
-        **{f"formula {found.name}": verdict_text(found) for found in score.formulas},
+        **{f"formula {formula.name}": verdict_text(formula) for formula in score.formulas},
     }
 
 
-def verdict_text(found: FormulaVerdict) -> str:
+def verdict_text(formula: FormulaVerdict) -> str:
     """Return the verdict on a formula, since when it is definite, and whether false may be said late."""
-    when = "" if found.time is None else f" since {found.time:.3f} s"
-    return f"{found.verdict}{when}" + ("" if found.early or found.verdict == "true" else " (judged by parts)")
+    when = "" if formula.time is None else f" since {formula.time:.3f} s"
+    return f"{formula.verdict}{when}" + ("" if formula.early or formula.verdict == "true" else " (judged by parts)")
 
 
 def score_table(sheet: ScoreSheet, width: int = WIDTH) -> Table:
@@ -194,8 +190,8 @@ def formula_table(sheet: ScoreSheet) -> Table:
     table.add_column("formula", overflow="fold")
     table.add_column("verdict", no_wrap=True)
     for score in sheet.trials:
-        for found in score.formulas:
-            table.add_row(str(score.trial), Text(shown(found.name)), verdict_text(found))
+        for formula in score.formulas:
+            table.add_row(str(score.trial), Text(shown(formula.name)), verdict_text(formula))
     return table
 
 
@@ -209,9 +205,9 @@ def _ranked(scores: Scores) -> dict[str, list[Score]]:
         found.setdefault(score.controller or "-", []).append(score)
 
     def merit(name: str) -> tuple[float, float]:
-        own, trials = found[name], len(found[name])
-        counted = sum(score.counted_rounds for score in own) / trials
-        return counted, math.fsum(score.rounds_before_breach for score in own) / trials
+        of_controller, trials = found[name], len(found[name])
+        counted = sum(score.counted_rounds for score in of_controller) / trials
+        return counted, math.fsum(score.rounds_before_breach for score in of_controller) / trials
 
     return {name: found[name] for name in sorted(found, key=merit, reverse=True)}
 
@@ -219,7 +215,7 @@ def _ranked(scores: Scores) -> dict[str, list[Score]]:
 def _needed(scores: Scores) -> dict[str, Column]:
     """Return the columns that some scores need: ours, then those of the metrics that were asked for."""
     found = {heading: column for heading, column in COLUMNS.items() if column.needed(scores)}
-    names = dict.fromkeys(own.column for score in scores for own in score.metrics)
+    names = dict.fromkeys(metric.column for score in scores for metric in score.metrics)
     return {**found, **{column.short or column.label: _further(column) for column in names}}
 
 
@@ -227,7 +223,7 @@ def _further(column: metric.Column) -> Column:
     """Return what is shown of a further metric's column."""
 
     def cell(score: Score) -> str:
-        found = {own.column: own.value for own in score.metrics}.get(column)
+        found = {metric.column: metric.value for metric in score.metrics}.get(column)
         if found is None:
             return "-"
         if isinstance(found, bool):
@@ -258,7 +254,7 @@ def _fitting(columns: dict[str, Column], sheet: ScoreSheet, room: int) -> dict[s
     }
     kept = dict(columns)
     for heading in sorted(columns, key=lambda heading: -columns[heading].spare):
-        if sum(widths[own] for own in kept) <= room or not columns[heading].spare:
+        if sum(widths[place] for place in kept) <= room or not columns[heading].spare:
             break
         del kept[heading]
     return kept

@@ -39,14 +39,10 @@ ConfigurationOption = Annotated[
         autocompletion=options.shipped,
     ),
 ]
-SeedOption = Annotated[
-    int, typer.Option("--seed", metavar="S", min=0, help="The seed of the configuration's trials.")
-]
+SeedOption = Annotated[int, typer.Option("--seed", metavar="S", min=0, help="The seed of the configuration's trials.")]
 TrialOption = Annotated[
     int | None,
-    typer.Option(
-        "--trial", metavar="I", min=0, help="The trial's number.", show_default="as the record says"
-    ),
+    typer.Option("--trial", metavar="I", min=0, help="The trial's number.", show_default="as the record says"),
 ]
 SimulatorOption = Annotated[
     str | None,

@@ -22,9 +22,9 @@ _PAGE = ("pace", "port", "no_browser")
 """Options of the page, by the parameter of `run`; all others say what is run."""
 _HINTS = get_type_hints(run, include_extras=True)
 _PARAMETERS = [
-    own.replace(annotation=_HINTS[own.name])
-    for own in inspect.signature(run).parameters.values()
-    if own.name != "watch"
+    parameter.replace(annotation=_HINTS[parameter.name])
+    for parameter in inspect.signature(run).parameters.values()
+    if parameter.name != "watch"
 ]
 
 
@@ -36,17 +36,17 @@ def watch(source: str, **chosen: Any) -> None:
     from dubins_traffic.record.reader import Record
     from dubins_traffic.runs.plan import load_runnable
 
-    usual = {own.name: own.default for own in _PARAMETERS}
+    usual = {parameter.name: parameter.default for parameter in _PARAMETERS}
     page = {name: chosen[name] for name in _PAGE}
     if all(value == usual[name] for name, value in chosen.items() if name not in _PAGE):
-        found = load_runnable(source, rnd=None, seed=0)
-        if isinstance(found, Record):
-            _show(source, found, **page)
+        runnable = load_runnable(source, rnd=None, seed=0)
+        if isinstance(runnable, Record):
+            _show(source, runnable, **page)
             return
     run(source, watch=True, **chosen)
 
 
-watch.__annotations__ = {own.name: own.annotation for own in _PARAMETERS}
+watch.__annotations__ = {parameter.name: parameter.annotation for parameter in _PARAMETERS}
 setattr(watch, "__signature__", inspect.Signature(_PARAMETERS))  # noqa: B010  # a function has none of its own
 
 

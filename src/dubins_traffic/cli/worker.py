@@ -32,15 +32,11 @@ NameOption = Annotated[
 ]
 FolderOption = Annotated[
     str | None,
-    typer.Option(
-        "--folder", metavar="DIR", help="For submissions, unpacked.", show_default="in your cache folder"
-    ),
+    typer.Option("--folder", metavar="DIR", help="For submissions, unpacked.", show_default="in your cache folder"),
 ]
 TrustOption = Annotated[
     bool,
-    typer.Option(
-        "--trust-submissions", help="Run submissions also where this machine can't enforce every limit."
-    ),
+    typer.Option("--trust-submissions", help="Run submissions also where this machine can't enforce every limit."),
 ]
 RayOption = Annotated[
     str | None,

@@ -55,9 +55,7 @@ def _time(value: object) -> datetime:
 
 
 def _seed(value: object) -> object:
-    if value == SECRET or (
-        isinstance(value, int) and not isinstance(value, bool) and 0 <= value < limits.SEEDS
-    ):
+    if value == SECRET or (isinstance(value, int) and not isinstance(value, bool) and 0 <= value < limits.SEEDS):
         return value
     raise fault("not a seed", f'an integer >= 0 and < {limits.SEEDS}, or "{SECRET}"')
 
@@ -66,9 +64,7 @@ Time = Annotated[datetime, BeforeValidator(_time), WithJsonSchema({"type": "stri
 Seed = Annotated[
     Any,
     AfterValidator(_seed),
-    WithJsonSchema(
-        {"anyOf": [{"type": "integer", "minimum": 0, "maximum": limits.SEEDS - 1}, {"const": SECRET}]}
-    ),
+    WithJsonSchema({"anyOf": [{"type": "integer", "minimum": 0, "maximum": limits.SEEDS - 1}, {"const": SECRET}]}),
 ]
 Seconds = Annotated[float, Field(gt=0, le=limits.SECONDS)]
 Count = Annotated[int, Field(ge=1, le=1_000_000)]
@@ -88,9 +84,7 @@ class LimitsTable(Strict):
         f"the duration of the trial, {WALL_S[0]:g} at least and {WALL_S[1]:g} at most",
     )
     memory: Annotated[int, Field(ge=16, le=1_000_000)] = Field(default=1024, description="memory, MiB")
-    processes: Annotated[int, Field(ge=1, le=10_000)] = Field(
-        default=64, description="processes and threads at a time"
-    )
+    processes: Annotated[int, Field(ge=1, le=10_000)] = Field(default=64, description="processes and threads at a time")
     files: Annotated[int, Field(ge=1, le=100_000)] = Field(
         default=64, description="what all files that it writes may hold together, MiB"
     )
@@ -261,8 +255,7 @@ class Phase:
         return digest(
             {
                 "configurations": [
-                    {"name": named.name, "document": named.configuration.inlined()}
-                    for named in self.configurations
+                    {"name": named.name, "document": named.configuration.inlined()} for named in self.configurations
                 ],
                 "trials": self.model.trials,
                 "limits": self.model.limits.model_dump(),
@@ -342,9 +335,7 @@ class Competition:
     """Where sealed and revealed seeds lie: the folder of the file."""
 
     @staticmethod
-    def from_document(
-        document: Mapping[str, Any], file: str | None = None, folder: Path | None = None
-    ) -> Competition:
+    def from_document(document: Mapping[str, Any], file: str | None = None, folder: Path | None = None) -> Competition:
         """Check `document`; relative paths are looked up in `folder`, then in the current directory.
 
         Raises
@@ -357,8 +348,7 @@ class Competition:
         try:
             check_names([entry.name for entry in model.configurations], "configurations")
             configurations = tuple(
-                Named(entry.name, configuration_of(entry, k, folder))
-                for k, entry in enumerate(model.configurations)
+                Named(entry.name, configuration_of(entry, k, folder)) for k, entry in enumerate(model.configurations)
             )
             made = Competition(_complete(plain_document, configurations), model, configurations, file, folder)
             for name in model.phases:

@@ -108,9 +108,7 @@ class Judged(Strict):
         for name in _NUMBERS:
             value = self.row[name]
             if not isinstance(value, float | int | None):
-                raise InputError(
-                    "not a number", field=f"row.{name}", value=value, expected="a number or null"
-                )
+                raise InputError("not a number", field=f"row.{name}", value=value, expected="a number or null")
 
 
 def judge(
@@ -321,9 +319,7 @@ def evaluate(
                 _append(folder / RESULTS, _line(judged.to_json()))
                 if progress is not None:
                     progress(len(by_number), len(phase.numbers))
-        done = Evaluation(
-            phase.name, phase.rules, submission.digest, tuple(by_number[k] for k in sorted(by_number))
-        )
+        done = Evaluation(phase.name, phase.rules, submission.digest, tuple(by_number[k] for k in sorted(by_number)))
         _write(done, folder)
     return done
 
@@ -342,9 +338,7 @@ def load_evaluation(place: Path) -> Evaluation:
         raise InputError("no results", file=str(path), expected="what `dubins-traffic evaluate` keeps")
     head = _json(lines[0], path, 1)
     if not _is_head(head):
-        raise InputError(
-            "not results", file=str(path), value=head, expected="version, phase, rules, submission"
-        )
+        raise InputError("not results", file=str(path), value=head, expected="version, phase, rules, submission")
     by_number: dict[int, Judged] = {}
     for k, line in enumerate(lines[1:], 2):
         judged = Judged.from_json(_json(line, path, k), f"{path}: line {k}")
@@ -470,9 +464,7 @@ def _append(path: Path, line: str) -> None:
             if file.write(line.encode()) != len(line.encode()):
                 raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     except OSError as error:
-        raise InputError(
-            f"can't be written ({error.strerror}); what is finished is kept", file=str(path)
-        ) from None
+        raise InputError(f"can't be written ({error.strerror}); what is finished is kept", file=str(path)) from None
 
 
 def _line(document: dict[str, Any]) -> str:

@@ -84,7 +84,7 @@ def rehearse(
                     trust=trust,
                     progress=lambda _done, _of, ended=ended: ended.append(time.monotonic()),
                 ).results
-                faults = tuple(sorted({own.end for own in done if own.owner is not None}))
+                faults = tuple(sorted({outcome.end for outcome in done if outcome.owner is not None}))
                 yield Rehearsed(phase, controller, len(done), _seconds(ended, workers), faults)
 
 

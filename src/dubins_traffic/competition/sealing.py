@@ -117,9 +117,7 @@ def read_seeds(text: str, file: str | None = None) -> Seeds:
         raise InputError("not revealed seeds", file=file, value=lines[1:4], expected=expected)
     for name, rule in (("rules", _DIGEST), ("salt", _SALT)):
         if not rule.fullmatch(head[name]):
-            raise InputError(
-                "wrong value", file=file, field=name, value=head[name], expected="64 hexadecimal digits"
-            )
+            raise InputError("wrong value", file=file, field=name, value=head[name], expected="64 hexadecimal digits")
     for k, line in enumerate(lines[4:-1]):
         if not _SEED.fullmatch(line) or int(line) >= limits.SEEDS:
             raise InputError(
@@ -131,9 +129,7 @@ def read_seeds(text: str, file: str | None = None) -> Seeds:
 def check_belong(seeds: Seeds, phase: Seeded, file: str | None = None) -> None:
     """Refuse seeds that are of another phase, or of one whose rules were others; InputError if they are."""
     if seeds.phase != phase.name:
-        raise InputError(
-            "seeds of another phase", file=file, field="phase", value=seeds.phase, expected=phase.name
-        )
+        raise InputError("seeds of another phase", file=file, field="phase", value=seeds.phase, expected=phase.name)
     if seeds.rules != phase.rules:
         raise InputError(
             "the seeds were drawn for other configurations, trials, limits or another ranking",
@@ -406,9 +402,7 @@ def _check_secret(phase: Seeded) -> None:
 
 def _folder(phase: Seeded) -> Path:
     if phase.folder is None:
-        raise InputError(
-            "a competition without a folder", field=f"phases.{phase.name}", expected="one that is a file"
-        )
+        raise InputError("a competition without a folder", field=f"phases.{phase.name}", expected="one that is a file")
     return phase.folder
 
 
@@ -421,9 +415,7 @@ def cipher_class() -> Any:
 
 def cipher_of(key: bytes, salt: bytes) -> Any:
     """Return the cipher (AESGCM) whose key scrypt derives from a passphrase or key; MissingExtraError without it."""
-    derived = hashlib.scrypt(
-        checked_key(key), salt=salt, n=COST, r=_BLOCK, p=_LANES, maxmem=_MEMORY, dklen=32
-    )
+    derived = hashlib.scrypt(checked_key(key), salt=salt, n=COST, r=_BLOCK, p=_LANES, maxmem=_MEMORY, dklen=32)
     return cipher_class()(derived)
 
 
@@ -473,9 +465,7 @@ def read_key(path: Path, folder: Path | None) -> bytes:
 
 def _check_outside(path: Path, folder: Path | None) -> None:
     if folder is not None and path.resolve().is_relative_to(folder.resolve()):
-        raise InputError(
-            "a key in the folder of what it locks", file=str(path), expected="a place outside it"
-        )
+        raise InputError("a key in the folder of what it locks", file=str(path), expected="a place outside it")
 
 
 def checked_key(key: bytes) -> bytes:

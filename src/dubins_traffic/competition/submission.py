@@ -63,9 +63,7 @@ def folder_files(folder: Path, bounds: Bounds) -> dict[str, bytes]:
             data_of[_checked_name(name)] = data = _read(path, left, bounds)
             left -= len(data)
     except OSError as error:
-        raise InputError(
-            f"can't be read ({error.strerror})", file=os.fspath(error.filename or folder)
-        ) from None
+        raise InputError(f"can't be read ({error.strerror})", file=os.fspath(error.filename or folder)) from None
     _check_names(data_of)
     return data_of
 
@@ -101,9 +99,7 @@ def zip_files(data: bytes, bounds: Bounds) -> dict[str, bytes]:
             _check_count(len(entries), bounds)
             declared = sum(entry.file_size for entry in entries)
             if declared > bounds.total:
-                raise InputError(
-                    "unpacks to too much", value=declared, expected=f"at most {bounds.total >> 20} MiB"
-                )
+                raise InputError("unpacks to too much", value=declared, expected=f"at most {bounds.total >> 20} MiB")
             data_of: dict[str, bytes] = {}
             for entry in entries:
                 if entry.filename in data_of:
@@ -185,9 +181,7 @@ def _checked_name(name: str) -> str:
     if bad:
         raise InputError("not a name of a file", value=name, expected="a name inside the submission")
     if len(name.encode()) > _LONGEST_NAME or len(parts) > _DEEPEST:
-        raise InputError(
-            "too long a name", value=name, expected=f"at most {_LONGEST_NAME} bytes, {_DEEPEST} folders"
-        )
+        raise InputError("too long a name", value=name, expected=f"at most {_LONGEST_NAME} bytes, {_DEEPEST} folders")
     return name
 
 
@@ -245,9 +239,9 @@ class Manifest(Strict):
     python: Annotated[str, Field(pattern=r"^[\w./-]+\.py:[A-Za-z_]\w*$", max_length=200)] | None = Field(
         default=None, description="the class of a controller in Python, as `my/controller.py:Mine`"
     )
-    program: (
-        Annotated[list[Annotated[str, Field(min_length=1, max_length=1000)]], Field(min_length=1)] | None
-    ) = Field(default=None, description="a program that speaks lines, as `./drive`, and its arguments")
+    program: Annotated[list[Annotated[str, Field(min_length=1, max_length=1000)]], Field(min_length=1)] | None = Field(
+        default=None, description="a program that speaks lines, as `./drive`, and its arguments"
+    )
 
     image: Annotated[str, Field(pattern=r"^[\w-][\w.-]*$", max_length=100)] | None = Field(
         default=None, description="the archive of a container image, which runs `program`, else its own"
@@ -354,9 +348,7 @@ def _manifest(files: dict[str, bytes]) -> Manifest:
     if manifest.python is not None:
         place = manifest.python.rpartition(":")[0]
         if place not in files:
-            raise InputError(
-                "no such file", field=f"{MANIFEST}.python", value=place, expected="one in the submission"
-            )
+            raise InputError("no such file", field=f"{MANIFEST}.python", value=place, expected="one in the submission")
         _check_source(place, files[place])
     if manifest.image is not None and manifest.image not in files:
         raise InputError(
@@ -364,9 +356,7 @@ def _manifest(files: dict[str, bytes]) -> Manifest:
         )
     program = _program_of(manifest)
     if program is not None and program not in files:
-        raise InputError(
-            "no such file", field=f"{MANIFEST}.program", value=program, expected="one in the submission"
-        )
+        raise InputError("no such file", field=f"{MANIFEST}.program", value=program, expected="one in the submission")
     return manifest
 
 
@@ -382,9 +372,7 @@ def _toml(data: bytes) -> dict[str, object]:
 def _check_source(name: str, data: bytes) -> None:
     """Refuse what is no text; it is not parsed here, since text can be made that ends the parser's process."""
     if len(data) > MOST_SOURCE:
-        raise InputError(
-            "too large", field=name, value=len(data), expected=f"at most {MOST_SOURCE >> 20} MiB"
-        )
+        raise InputError("too large", field=name, value=len(data), expected=f"at most {MOST_SOURCE >> 20} MiB")
     try:
         data.decode()
     except UnicodeDecodeError as error:

@@ -45,9 +45,7 @@ def write_template(kind: str, folder: Path) -> list[Path]:
         folder.mkdir(parents=True, exist_ok=True)
         held = sorted(path.name for path in folder.iterdir())
     except OSError as error:
-        raise InputError(
-            f"can't be made ({error.strerror})", file=str(folder), expected="a new folder"
-        ) from None
+        raise InputError(f"can't be made ({error.strerror})", file=str(folder), expected="a new folder") from None
     if held:
         raise InputError(f"holds {held[0]}", file=str(folder), expected="a new or empty folder")
     for name, text in texts.items():

@@ -12,9 +12,7 @@ from dubins_traffic.competition.competition import Phase
 from dubins_traffic.competition.judging import Judged
 from dubins_traffic.competition.ranking import is_clean, is_cut, is_satisfied, missing, value
 
-State = Literal[
-    "received", "checking", "queued", "running", "scoring", "done", "rejected", "failed", "cancelled"
-]
+State = Literal["received", "checking", "queued", "running", "scoring", "done", "rejected", "failed", "cancelled"]
 LONGEST_LOG = 4_000
 """Most characters of the log's tail that are shown with aggregates."""
 OUR_FAULT: Final = "a fault of the platform: it runs again, and costs no quota"

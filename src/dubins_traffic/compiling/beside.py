@@ -85,9 +85,9 @@ class Wish:
 def wish_of(line: bytes) -> Wish | None:
     """Return the wish in a line; None of a line that was not written to its end."""
     try:
-        own: dict[str, Any] = json.loads(zlib.decompress(base64.b64decode(line.strip(), validate=True)))
-        paths = tuple(own.pop("paths"))
-        return Wish(**own, paths=paths)
+        fields: dict[str, Any] = json.loads(zlib.decompress(base64.b64decode(line.strip(), validate=True)))
+        paths = tuple(fields.pop("paths"))
+        return Wish(**fields, paths=paths)
     except (ValueError, zlib.error, TypeError, KeyError, AttributeError):
         return None
 
@@ -109,9 +109,7 @@ class Waiting:
         Whether nothing goes on before it is there.
     """
 
-    def __init__(
-        self, module: str, name: str, file: Path, kinds: Sequence[Kind], target: Path, *, waits: bool
-    ) -> None:
+    def __init__(self, module: str, name: str, file: Path, kinds: Sequence[Kind], target: Path, *, waits: bool) -> None:
         paths = tuple(os.path.abspath(path) for path in sys.path)  # noqa: PTH100  # an empty one is this folder
         self.wish = Wish(module, name, str(file), repr(tuple(kinds)), str(target), paths)
         self.failure = ""

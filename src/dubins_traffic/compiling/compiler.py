@@ -113,9 +113,9 @@ class Compiler:
         UnfitError
             If it returns what can't be handed over.
         """
-        own = tuple(_type_of(kind) for kind in kinds)
-        kernel.compile(own)
-        compiled = kernel.overloads[own]
+        types = tuple(_type_of(kind) for kind in kinds)
+        kernel.compile(types)
+        compiled = kernel.overloads[types]
         returned = _kind_of(compiled.fndesc.restype)
         module = self._entry(compiled.fndesc, kinds, symbol)
         _add_reshape(module)
@@ -136,10 +136,10 @@ class Compiler:
 
     def _set_apart(self, program: Any) -> None:
         """Say of the functions of a program that are rarely called that they are: they are put into no other one."""
-        rare = {own.fndesc.llvm_func_name for made in self._rare for own in made.overloads.values()}
-        for own in program.functions:
-            if own.name in rare:
-                own.add_function_attribute("cold")
+        rare = {overload.fndesc.llvm_func_name for made in self._rare for overload in made.overloads.values()}
+        for function in program.functions:
+            if function.name in rare:
+                function.add_function_attribute("cold")
 
     def _entry(self, described: Any, kinds: Sequence[Kind], symbol: str) -> Any:
         """Return a module with the function that reads the frame, calls the kernel and writes what it returns."""
@@ -153,7 +153,7 @@ class Compiler:
         callee = _ir.Function(module, kernel, described.llvm_func_name)
         builder = _ir.IRBuilder(entry.append_basic_block("entry"))
         frame = _Reader(context, builder, entry.args[0])
-        arguments = [frame.argument(kind, own) for kind, own in zip(kinds, described.argtypes, strict=True)]
+        arguments = [frame.argument(kind, argtype) for kind, argtype in zip(kinds, described.argtypes, strict=True)]
         status, value = context.call_conv.call_function(
             builder, callee, described.restype, described.argtypes, arguments
         )
@@ -184,16 +184,16 @@ class _Reader:
         self._base = builder.bitcast(base, _ir.IntType(64).as_pointer())
         self._next = 0
 
-    def argument(self, kind: Kind, own: Any) -> Any:
+    def argument(self, kind: Kind, numba_type: Any) -> Any:
         """Return an argument: a number, or what is in its block."""
         if kind[0] == "number" or kind == NONE:
             if kind == NONE:
                 self._word()
-            return self._value(kind, own)
+            return self._value(kind, numba_type)
         if is_place(kind):
-            return self._value(kind, own)
+            return self._value(kind, numba_type)
         block = self._builder.inttoptr(self._word(), _ir.IntType(8).as_pointer())
-        return _Reader(self._context, self._builder, block)._value(kind, own)
+        return _Reader(self._context, self._builder, block)._value(kind, numba_type)
 
     def _word(self) -> Any:
         builder = self._builder
@@ -201,50 +201,50 @@ class _Reader:
         self._next += 1
         return builder.load(place)
 
-    def _value(self, kind: Kind, own: Any) -> Any:
+    def _value(self, kind: Kind, numba_type: Any) -> Any:
         if kind == NONE:
             return self._context.get_dummy_value()
         if kind[0] == "number":
-            return self._number(own)
+            return self._number(numba_type)
         if kind[0] == "array":
-            return self._array(own)
+            return self._array(numba_type)
         if is_place(kind):
-            return self._builder.inttoptr(self._word(), self._context.get_value_type(own))
-        parts = [self._value(part, each) for part, each in zip(kind[-1], own.types, strict=True)]
-        return self._context.make_tuple(self._builder, own, parts)
+            return self._builder.inttoptr(self._word(), self._context.get_value_type(numba_type))
+        parts = [self._value(part, each) for part, each in zip(kind[-1], numba_type.types, strict=True)]
+        return self._context.make_tuple(self._builder, numba_type, parts)
 
-    def _number(self, own: Any) -> Any:
+    def _number(self, numba_type: Any) -> Any:
         builder, word = self._builder, self._word()
-        kind = self._context.get_value_type(own)
-        if isinstance(own, _types.Boolean):
+        kind = self._context.get_value_type(numba_type)
+        if isinstance(numba_type, _types.Boolean):
             return builder.trunc(word, kind)
-        if isinstance(own, _types.Float):
+        if isinstance(numba_type, _types.Float):
             real = builder.bitcast(word, _ir.DoubleType())
-            return real if own.bitwidth == 64 else builder.fptrunc(real, kind)
-        return word if own.bitwidth == 64 else builder.trunc(word, kind)
+            return real if numba_type.bitwidth == 64 else builder.fptrunc(real, kind)
+        return word if numba_type.bitwidth == 64 else builder.trunc(word, kind)
 
-    def _array(self, own: Any) -> Any:
-        array = self._context.make_array(own)(self._context, self._builder)
+    def _array(self, numba_type: Any) -> Any:
+        array = self._context.make_array(numba_type)(self._context, self._builder)
         data = self._builder.inttoptr(self._word(), array.data.type)
         count, size = self._word(), self._word()
-        shape = [self._word() for _ in range(own.ndim)]
-        strides = [self._word() for _ in range(own.ndim)]
+        shape = [self._word() for _ in range(numba_type.ndim)]
+        strides = [self._word() for _ in range(numba_type.ndim)]
         _arrays.populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
         array.nitems = count
         return array._getvalue()
 
 
-def _leaves(context: Any, builder: Any, own: Any, value: Any) -> Iterator[Any]:
+def _leaves(context: Any, builder: Any, shape: Any, value: Any) -> Iterator[Any]:
     """Yield the numbers of what a kernel returns, each in 64 bits."""
     word = _ir.IntType(64)
-    if isinstance(own, _types.BaseTuple):
-        for k, part in enumerate(own):
+    if isinstance(shape, _types.BaseTuple):
+        for k, part in enumerate(shape):
             yield from _leaves(context, builder, part, builder.extract_value(value, k))
-    elif isinstance(own, _types.Float):
-        yield builder.bitcast(value if own.bitwidth == 64 else builder.fpext(value, _ir.DoubleType()), word)
-    elif isinstance(own, _types.Integer) and own.signed:
-        yield value if own.bitwidth == 64 else builder.sext(value, word)
-    elif own is not _types.none:
+    elif isinstance(shape, _types.Float):
+        yield builder.bitcast(value if shape.bitwidth == 64 else builder.fpext(value, _ir.DoubleType()), word)
+    elif isinstance(shape, _types.Integer) and shape.signed:
+        yield value if shape.bitwidth == 64 else builder.sext(value, word)
+    elif shape is not _types.none:
         yield builder.zext(value, word) if value.type != word else value
 
 
@@ -253,10 +253,10 @@ def _reached(library: Any) -> list[Any]:
     found: dict[int, Any] = {}
     waiting = [library]
     while waiting:
-        own = waiting.pop()
-        if id(own) not in found:
-            found[id(own)] = own
-            waiting.extend(own._linking_libraries)
+        reached = waiting.pop()
+        if id(reached) not in found:
+            found[id(reached)] = reached
+            waiting.extend(reached._linking_libraries)
     return list(found.values())
 
 
@@ -274,9 +274,9 @@ def _close(program: Any, symbol: str) -> None:
 
 def _check(program: Any) -> None:
     """Raise UnfitError if a program needs functions of Numba or Python, which are not there where it is loaded."""
-    for own in program.functions:
-        if own.is_declaration and own.name.startswith(FOREIGN):
-            raise UnfitError(f"a kernel that needs {own.name}")
+    for function in program.functions:
+        if function.is_declaration and function.name.startswith(FOREIGN):
+            raise UnfitError(f"a kernel that needs {function.name}")
 
 
 def _add_reshape(module: Any) -> None:
@@ -313,7 +313,7 @@ def _type_of(kind: Kind) -> Any:
     if kind[0] == "row":
         return _dtypes.from_dtype(dtype_of(kind[1]))
     if kind[0] == "tables":
-        return TablesType(kind[1], tuple((name, _type_of(own)) for name, own in kind[2]))
+        return TablesType(kind[1], tuple((name, _type_of(part)) for name, part in kind[2]))
     parts = [_type_of(part) for part in kind[-1]]
     if kind[0] == "tuple":
         return _types.Tuple(parts)
@@ -330,18 +330,18 @@ def named(module: str, name: str) -> Any:
     return found
 
 
-def _kind_of(own: Any) -> Kind:
+def _kind_of(numba_type: Any) -> Kind:
     """Return the kind of what a kernel returns."""
-    if own is _types.none:
+    if numba_type is _types.none:
         return NONE
-    if isinstance(own, _types.BaseNamedTuple):
-        cls = own.instance_class
-        return "named", cls.__module__, cls.__qualname__, tuple(_kind_of(part) for part in own)
-    if isinstance(own, _types.BaseTuple):
-        return "tuple", tuple(_kind_of(part) for part in own)
-    if isinstance(own, _types.Boolean | _types.Integer | _types.Float):
-        return "number", _dtypes.as_dtype(own).str[1:]
-    raise UnfitError(f"a kernel that returns {own}")
+    if isinstance(numba_type, _types.BaseNamedTuple):
+        cls = numba_type.instance_class
+        return "named", cls.__module__, cls.__qualname__, tuple(_kind_of(part) for part in numba_type)
+    if isinstance(numba_type, _types.BaseTuple):
+        return "tuple", tuple(_kind_of(part) for part in numba_type)
+    if isinstance(numba_type, _types.Boolean | _types.Integer | _types.Float):
+        return "number", _dtypes.as_dtype(numba_type).str[1:]
+    raise UnfitError(f"a kernel that returns {numba_type}")
 
 
 def _leave(_name: str, _environment: Any) -> None:

@@ -89,9 +89,9 @@ def _no_text(_statement: object) -> str:
     return ""
 
 
-def _call(own: Any, *args: Any) -> Any:
+def _call(dispatcher: Any, *args: Any) -> Any:
     """Call a function of LLVM without a lock."""
-    return own._cfn(*args)
+    return dispatcher._cfn(*args)
 
 
 def _compare_quickly() -> None:
@@ -155,23 +155,23 @@ def _refresh_seldom() -> None:
     whole, typing = _base.BaseContext.refresh, _typing.BaseContext.refresh
     seen: dict[int, int] = {}
 
-    def refresh(own: Any) -> None:
-        now = _count(own, IMPLEMENTED) + _count(own.typing_context, TYPED)
-        if now == 0 or seen.get(id(own._registries)) != now:
-            whole(own)
-            seen[id(own._registries)] = _count(own, IMPLEMENTED) + _count(own.typing_context, TYPED)
+    def refresh(context: Any) -> None:
+        now = _count(context, IMPLEMENTED) + _count(context.typing_context, TYPED)
+        if now == 0 or seen.get(id(context._registries)) != now:
+            whole(context)
+            seen[id(context._registries)] = _count(context, IMPLEMENTED) + _count(context.typing_context, TYPED)
 
-    def refresh_types(own: Any) -> None:
-        now = _count(own, TYPED)
-        if now == 0 or seen.get(id(own._registries)) != now:
-            typing(own)
-            seen[id(own._registries)] = _count(own, TYPED)
+    def refresh_types(context: Any) -> None:
+        now = _count(context, TYPED)
+        if now == 0 or seen.get(id(context._registries)) != now:
+            typing(context)
+            seen[id(context._registries)] = _count(context, TYPED)
 
     _base.BaseContext.refresh, _typing.BaseContext.refresh = refresh, refresh_types
 
 
-def _count(own: Any, lists: tuple[str, ...]) -> int:
-    return sum(len(getattr(registry, name)) for registry in own._registries for name in lists)
+def _count(context: Any, lists: tuple[str, ...]) -> int:
+    return sum(len(getattr(registry, name)) for registry in context._registries for name in lists)
 
 
 def _list_variables_quickly() -> None:
@@ -179,16 +179,16 @@ def _list_variables_quickly() -> None:
     _ir.Stmt.list_vars, _ir.Expr.list_vars = _of_statement, _of_expression
 
 
-def _of_statement(own: Any) -> list[Any]:
+def _of_statement(statement: Any) -> list[Any]:
     found: list[Any] = []
-    for value in own.__dict__.values():
+    for value in statement.__dict__.values():
         _gather(value, found)
     return found
 
 
-def _of_expression(own: Any) -> list[Any]:
+def _of_expression(expression: Any) -> list[Any]:
     found: list[Any] = []
-    for value in own._kws.values():
+    for value in expression._kws.values():
         _gather(value, found)
     return found
 

@@ -195,10 +195,7 @@ def _place(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     def lengths(name: str) -> list[Any]:
         return [builder.extract_value(array, [position(name), k]) for k in range(own.ndim)]
 
-    whole = [
-        context.cast(builder, each, from_kind, types.intp)
-        for each, from_kind in zip(indices, kinds, strict=True)
-    ]
+    whole = [context.cast(builder, each, from_kind, types.intp) for each, from_kind in zip(indices, kinds, strict=True)]
     data = builder.extract_value(array, position("data"))
     strides = [] if own.layout == "C" else lengths("strides")
     return cgutils.get_item_pointer2(context, builder, data, lengths("shape"), strides, own.layout, whole)
@@ -220,9 +217,9 @@ def _store(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     place = _place(context, builder, signature, args)
     if place is None:
         return arrays.setitem_array(context, builder, signature, args)
-    own, _, kind = signature.args
-    value = context.cast(builder, args[2], kind, own.dtype)
-    return arrays.store_item(context, builder, own, value, place)
+    array_type, _, kind = signature.args
+    value = context.cast(builder, args[2], kind, array_type.dtype)
+    return arrays.store_item(context, builder, array_type, value, place)
 
 
 for _kind, _usual in (
@@ -254,8 +251,8 @@ def _fetch(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     array = context.make_array(kind)(context, builder, args[0])
     byte, number, word = ir.IntType(8).as_pointer(), ir.IntType(32), ir.IntType(64)
     address, size = builder.ptrtoint(array.data, word), word(LINE)
-    for k, own in enumerate(places):
-        index = context.cast(builder, builder.extract_value(args[1], k), own, types.intp)
+    for k, place in enumerate(places):
+        index = context.cast(builder, builder.extract_value(args[1], k), place, types.intp)
         size = builder.extract_value(array.strides, k)
         address = builder.add(address, builder.mul(index, size))
     end = builder.add(address, size)
@@ -263,9 +260,7 @@ def _fetch(context: Any, builder: Any, signature: Any, args: Any) -> Any:
     module = builder.module
     function = module.globals.get(INTRINSIC)
     if function is None:
-        function = ir.Function(
-            module, ir.FunctionType(ir.VoidType(), [byte, number, number, number]), INTRINSIC
-        )
+        function = ir.Function(module, ir.FunctionType(ir.VoidType(), [byte, number, number, number]), INTRINSIC)
     with cgutils.for_range_slice(builder, first, end, word(LINE)) as (line, _):
         builder.call(function, [builder.inttoptr(line, byte), number(READ), number(NEAREST), number(DATA)])
     return context.get_dummy_value()

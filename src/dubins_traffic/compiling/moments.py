@@ -78,9 +78,7 @@ def moments() -> Iterator[Callable[[], object]]:
     yield lambda: LanesGroup(pair, "sure").drive(1)
     visited = "visit_ego_{}_{}".format(*town.problem.goals[0])
     problem = replace(town.problem, laser=Laser(), formulas={**FORMULAS, "again": f"[] <> {visited}"})
-    noise = Disturbances(
-        position_noise=0.01, heading_noise=0.01, command_delay=1, command_loss=0.1, cars="all"
-    )
+    noise = Disturbances(position_noise=0.01, heading_noise=0.01, command_delay=1, command_loss=0.1, cars="all")
     yield partial(run_trial, replace(town, problem=problem, disturbances=noise), "lanes")
     yield partial(run_trial, replace(town, problem=problem), _Watching())
     yield partial(_together, pair, _Watching)

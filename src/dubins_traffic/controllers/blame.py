@@ -103,7 +103,7 @@ def _folders() -> set[str]:
 
 def _own_lines(frames: TracebackType | None) -> Iterator[str]:
     """Yield the lines of a traceback that are the controller's own, outermost first."""
-    own: list[traceback.FrameSummary] = []
+    frame_summaries: list[traceback.FrameSummary] = []
     installed: list[traceback.FrameSummary] = []
     for frame in traceback.extract_tb(frames):
         if frame.filename.startswith(_OURS):
@@ -111,8 +111,8 @@ def _own_lines(frames: TracebackType | None) -> Iterator[str]:
         if frame.filename.startswith(_INSTALLED):
             installed.append(frame)
         elif not frame.filename.startswith(_PYTHON):
-            own.append(frame)
-    for frame in own or installed:
+            frame_summaries.append(frame)
+    for frame in frame_summaries or installed:
         place = "cell" if _CELL.search(frame.filename) else Path(frame.filename).name
         line = shown(frame.line or "", LONGEST_LINE)
         yield f"{shown(place, LONGEST_LINE)}:{frame.lineno} in {frame.name}" + (f": {line}" if line else "")

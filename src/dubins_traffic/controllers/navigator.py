@@ -110,9 +110,7 @@ class Navigator:
         rules = RuleParameters.from_mapping(problem.rules)
         self._degrees: list[int] = problem.network.degrees.tolist()
         self._crossing_degree = rules.crossing_degree
-        self._tickets = _Tickets(
-            self._roads, 1 + len(problem.e_agents), ticks(rules.group_time, problem.rate)
-        )
+        self._tickets = _Tickets(self._roads, 1 + len(problem.e_agents), ticks(rules.group_time, problem.rate))
 
     def look(self, observation: Observation) -> Situation:
         """Return what there is to know of the frame of `observation`."""
@@ -163,9 +161,7 @@ class Navigator:
         """Return the lane by which a car may have come that is first seen in a disc: the one most along its heading."""
         ways = [arm ^ 1 for arm in self._network.arms(vertex)]
         directions = [lane_end_direction(self._roads, 0, lane) for lane in ways]
-        return max(
-            zip(directions, ways, strict=True), key=lambda own: own[0][0] * pose.c + own[0][1] * pose.s
-        )[1]
+        return max(zip(directions, ways, strict=True), key=lambda way: way[0][0] * pose.c + way[0][1] * pose.s)[1]
 
     def _next_lane(self, lane: int) -> int:
         following = self._network.successors(lane)
@@ -200,9 +196,7 @@ class Navigator:
 class _Way:
     """The middles of a lane and of the next, and the line between; places on it count from where the turn begins."""
 
-    def __init__(
-        self, roads: RoadTable, lane: int, out: int, middle: float, radius: float, reach: float
-    ) -> None:
+    def __init__(self, roads: RoadTable, lane: int, out: int, middle: float, radius: float, reach: float) -> None:
         self.lane, self.out = lane, out
         self._roads, self._middle, self._reach = roads, middle, reach
         self._path = path = ReferencePath(*way_between(roads, 0, lane, out, middle, radius))
@@ -263,13 +257,13 @@ class _Tickets:
 
     def before(self, observation: Observation, vertex: int) -> tuple[SensedCar, ...]:
         """Return the cars that are before the ego in the order at an intersection, first come first."""
-        own = observation.propositions
-        seen = {EGO: own} | {car.index: car.propositions for car in observation.others}
+        propositions = observation.propositions
+        seen = {EGO: propositions} | {car.index: car.propositions for car in observation.others}
         for index, now in seen.items():
             self._note(index, now, observation.tick)
         self._bits = {index: now.bits for index, now in seen.items()}
         waiting = [index for index, now in seen.items() if self._waits(now, vertex)]
-        if not waiting or own.bits & FLAG.FIRST:
+        if not waiting or propositions.bits & FLAG.FIRST:
             return ()
         members = np.array(waiting, dtype=np.int64)
         for index in waiting:

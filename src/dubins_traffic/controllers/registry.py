@@ -92,8 +92,8 @@ def load(spec: str) -> Controller:
         loaded or constructed (then a `ConstructionError`); or if the object lacks a method of
         `dubins_traffic.protocols.Controller`. Only Ctrl-C passes through.
     """
-    found = shield_of(spec)
-    return named.load(spec) if found is None else under_shield(load(found[0]), spec)
+    shield = shield_of(spec)
+    return named.load(spec) if shield is None else under_shield(load(shield[0]), spec)
 
 
 def is_shielded(spec: str) -> bool:

@@ -70,16 +70,16 @@ class Shield:
         if asked is None:
             return None
         given = self.shield_filter.filter(observation, asked)
-        found = self.shield_filter.intervention
-        if found is not None:
-            self._events.append((SHIELD, override_text(found.asked, found.given, found.reason)))
+        intervention = self.shield_filter.intervention
+        if intervention is not None:
+            self._events.append((SHIELD, override_text(intervention.asked, intervention.given, intervention.reason)))
         return given
 
     def report(self) -> Sequence[tuple[str, str]]:
         """Return what has happened since the last call: kind and detail of each event."""
-        found, self._events = self._events, []
+        events, self._events = self._events, []
         inner = cast(Reports, self._controller).report() if self._reports else ()
-        return [*inner, *found]
+        return [*inner, *events]
 
     def close(self) -> None:
         """Close the wrapped controller if it has a method `close`."""

@@ -74,9 +74,7 @@ def _on_arc(ahead: float, left: float, speed: float, radius: float) -> Command:
     the point lies straight behind.
     """
     square = ahead * ahead + left * left
-    bend = (
-        2.0 * abs(left) / square if square > 0.0 else math.inf
-    )  # so near that the square is 0: it is in the circle
+    bend = 2.0 * abs(left) / square if square > 0.0 else math.inf  # so near that the square is 0: it is in the circle
     if bend > 1.0 / radius:
         return Command(speed, 0.0)
     if ahead < 0.0:

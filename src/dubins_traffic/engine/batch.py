@@ -131,11 +131,9 @@ def run_batch(
     makers = scores.makers(scores.with_share(metrics, [controller]))
     each = outcomes(instances, controller, batch=batch, threads=threads, metrics=makers)
     if folder is not None:
-        own = partial(draw, configuration, seed)
-        there = claim(folder, called(controller), own, overwrite=overwrite, append=append)
-        each = _recorded(
-            each, folder, there, lambda own: kept(own.instance.trial - first, own), controller, makers
-        )
+        drawn = partial(draw, configuration, seed)
+        there = claim(folder, called(controller), drawn, overwrite=overwrite, append=append)
+        each = _recorded(each, folder, there, lambda done: kept(done.instance.trial - first, done), controller, makers)
     found: list[Outcome] = []
     for outcome in each:
         found.append(outcome)
@@ -146,9 +144,9 @@ def run_batch(
     return in_order(found)
 
 
-def in_order(found: Iterable[Outcome]) -> Batch:
+def in_order(outcomes: Iterable[Outcome]) -> Batch:
     """Return outcomes as a Batch, sorted by trial number."""
-    return Batch(tuple(sorted(found, key=lambda outcome: outcome.instance.trial)))
+    return Batch(tuple(sorted(outcomes, key=lambda outcome: outcome.instance.trial)))
 
 
 def outcomes(
@@ -196,9 +194,7 @@ def _groups(source: Iterator[Instance], batch: int, threads: int) -> Iterator[li
         yield [ahead.popleft() for _ in range(min(count, batch, len(ahead)))]
 
 
-def _run(
-    instances: Sequence[Instance], egos: Egos, cancelled: Event, metrics: Sequence[MetricMaker]
-) -> list[Outcome]:
+def _run(instances: Sequence[Instance], egos: Egos, cancelled: Event, metrics: Sequence[MetricMaker]) -> list[Outcome]:
     return list(run_together(instances, egos, cancelled.is_set, metrics, alone=True))
 
 
@@ -221,9 +217,9 @@ def run_together(
     """
     ways = egos.ways(instances)
     if alone:
-        yield from (outcome_of(egos.alone(own, metrics=metrics)) for own in ways[Way.ALONE])
-    for own in grouped(ways[Way.COMPILED]):
-        group = egos.group(own, Way.COMPILED, metrics)
+        yield from (outcome_of(egos.alone(instance, metrics=metrics)) for instance in ways[Way.ALONE])
+    for some in grouped(ways[Way.COMPILED]):
+        group = egos.group(some, Way.COMPILED, metrics)
         group.finish(cancelled)
         if not cancelled():
             yield from group.fresh(egos.name)
@@ -250,9 +246,7 @@ def _recorded(
             elif record.name in there:
                 yield replace(outcome, score=replace(outcome.score, record=told))
             else:
-                result = egos.alone(
-                    outcome.instance, record=record, overwrite=record.exists(), metrics=metrics
-                )
+                result = egos.alone(outcome.instance, record=record, overwrite=record.exists(), metrics=metrics)
                 yield replace(outcome, ending=result.ending, score=replace(result.score, record=told))
 
 

@@ -155,74 +155,74 @@ def run_trials(active: Ints, most: int, dt: float, commands: Floats, world: Worl
     """
     for k in range(active.shape[0]):
         b: int = active[k]
-        own = world.progress.trial[b]
-        own.status = STATUS.RUNNING
+        trial = world.progress.trial[b]
+        trial.status = STATUS.RUNNING
         for _ in range(most):
-            if own.status != STATUS.RUNNING:
+            if trial.status != STATUS.RUNNING:
                 break
-            _advance(b, dt, commands, own, world)
+            _advance(b, dt, commands, trial, world)
 
 
 @jit_inline
-def _advance(b: int, dt: float, commands: Floats, own: TrialProgress, world: World) -> None:
-    """Step trial b to its next frame, or set `own.status` to the reason why it can't be stepped."""
-    tick = own.tick
+def _advance(b: int, dt: float, commands: Floats, progress: TrialProgress, world: World) -> None:
+    """Step trial b to its next frame, or set `progress.status` to the reason why it can't be stepped."""
+    tick = progress.tick
     if world.breach_log.filled[0] + _room(b, world) > world.breach_log.row.shape[0]:
-        own.status = STATUS.NO_BREACHES
+        progress.status = STATUS.NO_BREACHES
         return
     ego_hit = False
     if tick >= 0:
-        _decide(b, tick, commands, own, world)
-        if own.status != STATUS.RUNNING:
+        _decide(b, tick, commands, progress, world)
+        if progress.status != STATUS.RUNNING:
             return
         before = world.work.found[0]
         least = world.spacing.least[b] - spacing_loss(world.spacing, b, tick)
         moved = step_trial(b, dt, least, commands, world)
         if moved != OUTCOME.MOVED:
-            own.status = STATUS.NO_CONTACTS if moved == OUTCOME.FULL else STATUS.NO_PAIRS
+            progress.status = STATUS.NO_CONTACTS if moved == OUTCOME.FULL else STATUS.NO_PAIRS
             return
-        own.decided = 0
+        progress.decided = 0
         if world.work.found[0] > before:
             ego_hit = _note_contacts(b, tick + 1, before, world)
-    own.tick = tick + 1
+    progress.tick = tick + 1
     refresh_spacing(world.state, b, tick + 1, world.spacing)
     label_trial(b, tick + 1, world.labelling)
     _observe(b, tick + 1, world)
     if ego_hit:
         world.tally.trial[b].sealed = 1
-    if tick + 1 >= own.last:
-        own.status = STATUS.ENDED
-    elif ego_hit and own.ends != 0:
-        own.status = STATUS.COLLIDED
+    if tick + 1 >= progress.last:
+        progress.status = STATUS.ENDED
+    elif ego_hit and progress.ends != 0:
+        progress.status = STATUS.COLLIDED
 
 
 @jit_inline
 def _room(b: int, world: World) -> int:
     """Return the most breaches that a frame of trial b can begin."""
-    own = world.terms[b]
-    return MOST * world.state.count[b] + own.goals_end - own.goals_begin
+    terms = world.terms[b]
+    return MOST * world.state.count[b] + terms.goals_end - terms.goals_begin
 
 
 @jit_inline
-def _decide(b: int, tick: int, commands: Floats, own: TrialProgress, world: World) -> None:
-    if own.decided != 0:
+def _decide(b: int, tick: int, commands: Floats, progress: TrialProgress, world: World) -> None:
+    if progress.decided != 0:
         return
-    if own.others != 0:
+    if progress.others != 0:
         if not decide_others(b, tick, world, commands):
-            own.status = STATUS.NO_SIGHT
+            progress.status = STATUS.NO_SIGHT
             return
         if not _are_finite(b, commands):
-            own.status = STATUS.FAULTY
-    if own.lawful != 0:
+            progress.status = STATUS.FAULTY
+    if progress.lawful != 0:
         spacing = world.spacing
         decide_lawful(
-            b, tick, own.sight2, spacing.apart[b], spacing_loss(spacing, b, tick), world, commands
+            b, tick, progress.sight2, spacing.apart[b], spacing_loss(spacing, b, tick), world, commands
         )  # fmt: skip
-    if own.free != 0:
+    if progress.free != 0:
         decide_free(b, tick, commands, world.drivers, world.judging, world.free)
-    if own.nudged != 0:
+    if progress.nudged != 0:
         nudge_trial(b, tick, commands, world.agents)
-    own.decided = 1
+    progress.decided = 1
 
 
 @jit_inline

@@ -130,8 +130,8 @@ class AskedGroup(SteppedGroup):
         self._clear = all(line.clear for line in self._lines)
         self._interventions = [0] * len(instances)
         self._closed = np.zeros(len(instances), dtype=bool)
-        own = [instance.trial for instance in instances] if numbers is None else numbers
-        self._trials = np.array(own)
+        places = [instance.trial for instance in instances] if numbers is None else numbers
+        self._trials = np.array(places)
         self._look()
         if shared is not None:
             try:
@@ -167,11 +167,11 @@ class AskedGroup(SteppedGroup):
         if not self._seats:
             raise DubinsTrafficError("trials of a BatchController can't be forked: it knows trials by number")
         twin = super().fork(trials, seeds)
-        own: list[Any] = []
+        drivers: list[Any] = []
         for b, instance in zip(trials, twin.instances, strict=True):
             mine = self._lines[b], self._senses[b], self._seats[b]
-            own.append(forked(mine, self.instances[b], instance))
-        twin._lines, twin._senses, twin._seats = map(list, zip(*own, strict=True))
+            drivers.append(forked(mine, self.instances[b], instance))
+        twin._lines, twin._senses, twin._seats = map(list, zip(*drivers, strict=True))
         twin._interventions = [self._interventions[b] for b in trials]
         twin._closed = np.zeros(len(trials), dtype=bool)
         twin._trials = self._trials[list(trials)]
@@ -334,11 +334,11 @@ class LanesGroup(SteppedGroup):
 
 def ask_all(groups: Sequence[AskedGroup], controller: BatchController) -> None:
     """Ask one controller for the commands of all egos."""
-    groups = [own for own in groups if len(own.active)]
+    groups = [group for group in groups if len(group.active)]
     if not groups:
         return
-    places = max(own.state.x.shape[1] for own in groups)
-    views = [own.view(places) for own in groups]
+    places = max(group.state.x.shape[1] for group in groups)
+    views = [group.view(places) for group in groups]
     whole = BatchView(
         np.concatenate([view.trial for view in views]),
         np.concatenate([view.tick for view in views]),
@@ -354,12 +354,12 @@ def ask_all(groups: Sequence[AskedGroup], controller: BatchController) -> None:
         raise
     except BaseException as error:
         blame.show(error)
-        for own in groups:
-            own.fail_all(error)
+        for group in groups:
+            group.fail_all(error)
         return
     row = 0
-    for own, view in zip(groups, views, strict=True):
-        own.take_all(view.tick, answer[row : row + len(view.tick)])
+    for group, view in zip(groups, views, strict=True):
+        group.take_all(view.tick, answer[row : row + len(view.tick)])
         row += len(view.tick)
 
 

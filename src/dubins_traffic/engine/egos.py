@@ -95,8 +95,8 @@ class Egos:
         found: dict[Way, list[Instance]] = {way: [] for way in Way}
         fits: dict[tuple[Any, ...], bool] = {}
         kept = list(instances)  # what tells trials apart is the identity of their parts, so all have to stay
-        for own in kept:
-            found[self._way(own, fits)].append(own)
+        for instance in kept:
+            found[self._way(instance, fits)].append(instance)
         return found
 
     def _way(self, instance: Instance, fits: dict[tuple[Any, ...], bool]) -> Way:
@@ -181,23 +181,23 @@ def ask(
     while True:
         if cancelled():
             raise KeyboardInterrupt
-        free = batch - sum(len(own.active) for own in groups)
+        free = batch - sum(len(group.active) for group in groups)
         taken = list(islice(waiting, free)) if 8 * free >= batch else []
-        groups += [egos.group(own, Way.ASKED, metrics) for own in grouped(filter(can_share, taken))]
+        groups += [egos.group(some, Way.ASKED, metrics) for some in grouped(filter(can_share, taken))]
         for own in taken:
             if not can_share(own):
                 yield outcome_of(egos.alone(own, metrics=metrics))
         if not groups and not taken:
             return
         if egos.shared is not None:
-            ask_all([own for own in groups if isinstance(own, AskedGroup)], egos.shared)
+            ask_all([group for group in groups if isinstance(group, AskedGroup)], egos.shared)
         for own in groups:
             if egos.shared is None:
                 own.decide()
         for own in groups:
             own.advance()
             yield from own.fresh(egos.name)
-        groups = [own for own in groups if len(own.active)]
+        groups = [group for group in groups if len(group.active)]
 
 
 def outcome_of(result: Result) -> Outcome:
@@ -241,6 +241,6 @@ def _is_fit(instance: Instance) -> bool:
 
 def undisturbed(instance: Instance) -> bool:
     """Tell whether the ego's observations have no noise and its commands neither delay nor loss."""
-    own = instance.disturbances
-    noise = own.position_noise > 0.0 or own.heading_noise > 0.0
-    return not noise and own.command_delay == 0 and own.command_loss == 0.0
+    disturbances = instance.disturbances
+    noise = disturbances.position_noise > 0.0 or disturbances.heading_noise > 0.0
+    return not noise and disturbances.command_delay == 0 and disturbances.command_loss == 0.0

@@ -112,9 +112,7 @@ class Group:
         Those of each trial up to its present frame.
     """
 
-    def __init__(
-        self, instances: Sequence[Instance], *, keeps_rules: bool, metrics: Sequence[Maker] = ()
-    ) -> None:
+    def __init__(self, instances: Sequence[Instance], *, keeps_rules: bool, metrics: Sequence[Maker] = ()) -> None:
         self.instances = tuple(instances)
         self._rate = instances[0].problem.rate
         problems = [instance.problem for instance in instances]
@@ -156,8 +154,8 @@ class Group:
         self.contacts: list[list[Contact]] = [[] for _ in instances]
         self.breaches: list[list[Breach]] = [[] for _ in instances]
         self._seen: list[set[tuple[int, int]]] = [set() for _ in instances]
-        own = [[OwnMetrics(metrics)] for _ in instances]
-        self._buffer = FrameBuffer(instances, own) if metrics else None
+        sinks = [[OwnMetrics(metrics)] for _ in instances]
+        self._buffer = FrameBuffer(instances, sinks) if metrics else None
         self._take = bound(run_trials)
         self._run(self.active, 1)
         self._aim()
@@ -319,8 +317,8 @@ class Group:
 
     def margins(self, trials: Ints) -> Rows[EgoMargins]:
         """Return the margins of rules 1 and 2 up to the present frames of `trials`, (B,); others' are infinite."""
-        own = self._world
-        return tally_margins(trials, self.ticks[trials] + 1, own.tally, self._margins, own.roads, own.cars)
+        world = self._world
+        return tally_margins(trials, self.ticks[trials] + 1, world.tally, self._margins, world.roads, world.cars)
 
     def _progress(self, contacts: int, breaches: int) -> Progress:
         trial = table(TrialProgress, len(self.instances))
@@ -332,7 +330,7 @@ class Group:
         trial["nudged"] = np.array(nudged)[whose]
         free = [any(agent.kind == FREE for agent in self.instances[b].e_agents) for b in fleets]
         trial["free"] = np.array(free)[whose]
-        trial["others"] = np.array([not own <= KEEP_RULES | {REMOTE} for own in kinds])[whose]
+        trial["others"] = np.array([not kind <= KEEP_RULES | {REMOTE} for kind in kinds])[whose]
         trial["sight2"] = np.square([instance.problem.sensing_radius for instance in self.instances])
         return Progress(trial, table(ContactNote, contacts), table(BreachPlace, breaches))
 
@@ -342,9 +340,9 @@ class Group:
         drivers, labels = world.drivers, world.labels
         world.progress.trial["lawful"] = drivers.active
         for b in np.flatnonzero(drivers.car["kind"][:, EGO] == KIND.ROUND).tolist():
-            own = drivers.car[b, EGO]
+            car = drivers.car[b, EGO]
             lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
-            own.place = nearest_stage(drivers.distance, int(own.first), int(own.last), lane, segment)
+            car.place = nearest_stage(drivers.distance, int(car.first), int(car.last), lane, segment)
 
     def _run(self, active: Ints, most: int) -> None:
         """Step trials by up to `most` ticks; tick by tick if there are metrics that see every frame."""
@@ -386,7 +384,11 @@ class Group:
                 self.end(b, End.AGENT_FAULT, agent_fault(self.instances[b], self.commands[b]))
             elif why == STATUS.COLLIDED:
                 tick = int(self.ticks[b])
-                mine = [own for own in self.contacts[b] if own.tick == tick and EGO in (own.car, own.other)]
+                mine = [
+                    contact
+                    for contact in self.contacts[b]
+                    if contact.tick == tick and EGO in (contact.car, contact.other)
+                ]
                 self.end(b, End.COLLISION, collision_detail(self.instances[b], mine[0]))
 
     def _drain(self) -> None:
@@ -469,8 +471,8 @@ def _forked(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, dt
 def _rows_of(table: Table, trials: Ints, **other: Any) -> Table:
     """Return a copy of a table with the rows `trials` of each array, except for the arrays given in `other`."""
     names = table.field_names
-    own = [other[name] if name in other else array[trials] for name, array in zip(names, table, strict=True)]
-    return type(table)(*own)
+    columns = [other[name] if name in other else array[trials] for name, array in zip(names, table, strict=True)]
+    return type(table)(*columns)
 
 
 def _gathered(begin: Ints, count: Ints) -> tuple[Ints, Ints]:
@@ -481,7 +483,7 @@ def _gathered(begin: Ints, count: Ints) -> tuple[Ints, Ints]:
 
 
 def _copied(table: Table) -> Table:
-    return type(table)(*(_copied(own) if isinstance(own, Tables) else own.copy() for own in table))
+    return type(table)(*(_copied(part) if isinstance(part, Tables) else part.copy() for part in table))
 
 
 def _obstacles(table: ObstacleTable, trials: Ints) -> ObstacleTable:
@@ -505,10 +507,10 @@ def _breach_log(log: BreachLog, trials: Ints, goals: Ints) -> BreachLog:
 def _tally(tally: Tally, trials: Ints) -> Tally:
     off = np.append(tally.trial["first_goal"], len(tally.goal))
     ends, goals = _gathered(off[trials], np.diff(off)[trials])
-    own = tally.trial[trials]
-    own["first_goal"], own["last_goal"] = ends[:-1], ends[1:]
+    trial = tally.trial[trials]
+    trial["first_goal"], trial["last_goal"] = ends[:-1], ends[1:]
     names = "goal", "sample_done", "round_done", "early_done"
-    return _rows_of(tally, trials, trial=own, **{name: getattr(tally, name)[goals] for name in names})
+    return _rows_of(tally, trials, trial=trial, **{name: getattr(tally, name)[goals] for name in names})
 
 
 def _free(free: Free, trials: Ints) -> Free:

@@ -122,9 +122,7 @@ def _seconds_excused(excuses: bool | str | float) -> float:
     if isinstance(excuses, bool):
         return math.inf if excuses else 0.0
     if isinstance(excuses, str) or not excuses >= 0.0:
-        raise InputError(
-            "no excuses", field="excuses", value=excuses, expected=f"True, False, {WINDOW} or seconds"
-        )
+        raise InputError("no excuses", field="excuses", value=excuses, expected=f"True, False, {WINDOW} or seconds")
     return excuses
 
 
@@ -144,7 +142,7 @@ def part_that_counts(b: int, n: int, rule: int, tick: int, tables: BlameTables) 
 
     Breaches come in the order of time; of one frame those of e-agents first, by rule, then by car.
     """
-    own = tables.trial[b]
+    trial = tables.trial[b]
     part = tables.part[rule, 1 if n == EGO else 0]
     if n != EGO and tables.excepted[rule] > 0:
         exceeds = _exceeds(b, n, tick, tables.excepted[rule], tables)
@@ -153,20 +151,20 @@ def part_that_counts(b: int, n: int, rule: int, tick: int, tables: BlameTables) 
     if part < 0 or is_excused(b, n, tick, tables):
         return -1
     if n == EGO:
-        own.last_of_ego = tick
+        trial.last_of_ego = tick
     else:
-        own.last_of_others = tick
-    if own.first < 0:
-        own.first = n
+        trial.last_of_others = tick
+    if trial.first < 0:
+        trial.first = n
     return part
 
 
 @jit_inline
 def is_excused(b: int, n: int, tick: int, tables: BlameTables) -> bool:
     """Tell whether nothing that car n of trial b breaks in frame `tick` counts."""
-    own = tables.trial[b]
-    since = tick - (own.last_of_others if n == EGO else own.last_of_ego)
-    soon = own.window > 0.0 and since <= own.window and since < INFINITE
+    trial = tables.trial[b]
+    since = tick - (trial.last_of_others if n == EGO else trial.last_of_ego)
+    soon = trial.window > 0.0 and since <= trial.window and since < INFINITE
     return soon and since >= (0 if n == EGO else 1)
 
 

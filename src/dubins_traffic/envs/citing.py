@@ -23,9 +23,7 @@ def cited(trial: Instance, commands: Floats) -> tuple[Instance, Scripted]:
         Speed, m/s, and yaw rate, rad/s, of all cars in each tick.
     """
     agents = tuple(
-        EAgent(
-            "scripted", agent.name, "scripted", parameters_of("scripted", _script(commands[:, car], trial))
-        )
+        EAgent("scripted", agent.name, "scripted", parameters_of("scripted", _script(commands[:, car], trial)))
         if agent.kind == REMOTE
         else agent
         for car, agent in enumerate(trial.e_agents, start=1)

@@ -61,9 +61,7 @@ class Roles:
     """Whether the commands of all cars in each tick are kept."""
 
     @staticmethod
-    def of(
-        settings: Settings, learned: Sequence[str] | None, ego: str | None, excuses: bool | str | float
-    ) -> Roles:
+    def of(settings: Settings, learned: Sequence[str] | None, ego: str | None, excuses: bool | str | float) -> Roles:
         """Return the roles in which learners drive the e-agents called `learned`, or all, and the ego if `ego` is None.
 
         Raises
@@ -74,9 +72,7 @@ class Roles:
         sample = settings.sample
         if settings.disturbed and ego is None:
             value = sample.disturbances
-            raise InputError(
-                "no agent", field="disturbances", value=value, expected="none, or an ego's controller"
-            )
+            raise InputError("no agent", field="disturbances", value=value, expected="none, or an ego's controller")
         names = sample.names
         for name in learned or ():
             if name not in names[1:]:
@@ -87,9 +83,7 @@ class Roles:
                 cars.append(car)
             elif agent.kind not in KEEP_RULES:
                 known = ", ".join(sorted(KEEP_RULES))
-                raise InputError(
-                    "an e-agent beside learners", field="e-agents", value=agent.kind, expected=known
-                )
+                raise InputError("an e-agent beside learners", field="e-agents", value=agent.kind, expected=known)
         if not cars:
             raise InputError("nobody learns", field="learned", value=learned, expected="at least one car")
         return Roles(cars, ego, excuses=excuses)
@@ -142,9 +136,9 @@ class CrewBank(Bank):
             before=table(Before, 1), **fleet.given,
         )  # fmt: skip
         first = [
-            (b, own.car, RULES.index(own.rule))
+            (b, breach.car, RULES.index(breach.rule))
             for b, breaches in enumerate(group.breaches)
-            for own in sorted(breaches, key=lambda own: (own.car == EGO, *order(own)))
+            for breach in sorted(breaches, key=lambda own: (own.car == EGO, *order(own)))
         ]
         whose, cars, rules = np.array(first, dtype=np.int64).reshape(-1, 3).T.copy()
         charge_first(whose, cars, rules, self.tables.blame)
@@ -226,8 +220,8 @@ class CrewShields(CarShields):
     ) -> None:
         super().__init__(problems, views, cars)
         modes = self._shields.ego["mode"].reshape(cars.shape)
-        for car, own in overtakes.items():
-            modes[:, car] = get_args(Overtakes).index(own)
+        for car, overtake in overtakes.items():
+            modes[:, car] = get_args(Overtakes).index(overtake)
 
 
 class CrewFleet(Fleet):
@@ -318,9 +312,7 @@ class CrewFleet(Fleet):
         for instance in drawn:
             if instance.names != self._names:
                 expected = ", ".join(self._names)
-                raise InputError(
-                    "trials have other cars", field="e-agents", value=instance.names, expected=expected
-                )
+                raise InputError("trials have other cars", field="e-agents", value=instance.names, expected=expected)
         bank = CrewBank(drawn, self)
         return [(bank, row) for row in range(len(drawn))]
 

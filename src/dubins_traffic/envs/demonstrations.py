@@ -62,8 +62,7 @@ def write_minari(
     env = TrafficEnv(observation="object", **more)
     which = [{"seed": seed, "options": {"episode": number}} for number in range(episodes)]
     buffers = [
-        collector.EpisodeBuffer(id=number, **own, **_driven(env, controller, own))
-        for number, own in enumerate(which)
+        collector.EpisodeBuffer(id=number, **who, **_driven(env, controller, who)) for number, who in enumerate(which)
     ]
     with warnings.catch_warnings():
         # It warns of authors and links, which whoever publishes a dataset adds.

@@ -44,14 +44,10 @@ class Levels:
 
     def __post_init__(self) -> None:
         if isinstance(self.count, bool) or not 1 <= self.count < TEST:
-            raise InputError(
-                "not a number of levels", field="levels.count", value=self.count, expected=">= 1"
-            )
+            raise InputError("not a number of levels", field="levels.count", value=self.count, expected=">= 1")
         check_numbers(self.seed, 0)
         if self.split not in ("train", "test"):
-            raise InputError(
-                "no such set of levels", field="levels.split", value=self.split, expected="train or test"
-            )
+            raise InputError("no such set of levels", field="levels.split", value=self.split, expected="train or test")
 
     @staticmethod
     def of(given: Levels | Mapping[str, Any] | int | None) -> Levels | None:
@@ -62,9 +58,7 @@ class Levels:
             return Levels(given)
         unknown = given.keys() - {"count", "seed", "split"}
         if unknown or "count" not in given:
-            raise InputError(
-                "not a pool of levels", field="levels", value=dict(given), expected="count, seed, split"
-            )
+            raise InputError("not a pool of levels", field="levels", value=dict(given), expected="count, seed, split")
         return Levels(**given)
 
 
@@ -132,11 +126,7 @@ def seeds_of(seed: int | Sequence[int | None], envs: int) -> list[tuple[int, int
     """Return the base seed and number of each environment: i under one seed for all, 0 under seeds of their own."""
     if isinstance(seed, int | np.integer):
         places = (divmod(env, MOST_ENVS) for env in range(envs))
-        return [
-            ((int(seed) + APART * block) % limits.SEEDS if block else int(seed), env) for block, env in places
-        ]
+        return [((int(seed) + APART * block) % limits.SEEDS if block else int(seed), env) for block, env in places]
     if len(seed) != envs:
-        raise InputError(
-            "not one seed for each environment", field="seed", value=len(seed), expected=str(envs)
-        )
+        raise InputError("not one seed for each environment", field="seed", value=len(seed), expected=str(envs))
     return [(int(cast(int, each)), 0) for each in seed]

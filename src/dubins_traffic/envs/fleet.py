@@ -105,9 +105,7 @@ class Bank:
         What stands between environments and their egos, of trials that are disturbed or under a shield, by their rows.
     """
 
-    def __init__(
-        self, group: Group, outlook: OutlookTables, board: Board, each: Sequence[Problem], shown: int
-    ) -> None:
+    def __init__(self, group: Group, outlook: OutlookTables, board: Board, each: Sequence[Problem], shown: int) -> None:
         self._shown = shown
         self.group, self.outlook = group, outlook
         self.steps = StepTables(stride=strides(each), **board.arrays)
@@ -169,10 +167,10 @@ class Bank:
         """Replace the egos' commands for the coming tick by what disturbances and shields make of them."""
         self._look(rows, envs)
         for row in rows.tolist():
-            own, stride = self.between.get(row), cast(Stride, self.steps.stride[row])
-            if own is not None and stride.left > 0:
+            channel, stride = self.between.get(row), cast(Stride, self.steps.stride[row])
+            if channel is not None and stride.left > 0:
                 command = self.group.commands[row, EGO]
-                command[:] = own.command(command if begins else None)
+                command[:] = channel.command(command if begins else None)
 
     def _settle(self, rows: Ints) -> None:
         self.group.settle(rows)
@@ -239,7 +237,7 @@ class Fleet:
         self._who[env], self._next[env] = who, episode
         self._is_fresh[env] = True
         self._ready[env].clear()
-        self._drawn = [own for own in self._drawn if own[0] != env]
+        self._drawn = [waiting for waiting in self._drawn if waiting[0] != env]
 
     def keep(self, shield: Overtakes) -> None:
         """Keep all egos under shields from their next trials on, which may cross the centre line when `shield` says."""

@@ -73,9 +73,7 @@ class TrafficParallelVectorEnv:
         levels: Levels | Mapping[str, Any] | int | None = None,
     ) -> None:
         if isinstance(num_envs, bool) or num_envs < 1:
-            raise InputError(
-                "can't be a vector environment", field="num_envs", value=num_envs, expected=">= 1"
-            )
+            raise InputError("can't be a vector environment", field="num_envs", value=num_envs, expected=">= 1")
         self.settings = Settings(config, "flat", action, frame_skip, None, cars, levels)
         self.num_envs = num_envs
         self.fleet = CrewFleet(
@@ -171,9 +169,7 @@ class TrafficParallelVectorEnv:
         info = {
             "cost": cost,
             "reward_terms": {name: weighted[..., k].copy() for k, name in enumerate(PAID)},
-            "costs": {
-                name: terms[..., k].copy() for k, name in enumerate(PAID) if first <= k < len(PAID) - 2
-            },
+            "costs": {name: terms[..., k].copy() for k, name in enumerate(PAID) if first <= k < len(PAID) - 2},
             "broke_first": fleet.first.copy(),
         }
         return info | ({"interventions": fleet.stepped_in[:, fleet.learned]} if fleet.roles.shields else {})

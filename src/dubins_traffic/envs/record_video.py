@@ -50,9 +50,7 @@ class RecordVideo(gymnasium.Wrapper[Any, Any, Any, Any]):
     ) -> None:
         super().__init__(env)
         if env.render_mode != "rgb_array":
-            raise InputError(
-                "nothing to record", field="render_mode", value=env.render_mode, expected="rgb_array"
-            )
+            raise InputError("nothing to record", field="render_mode", value=env.render_mode, expected="rgb_array")
         self._folder = Path(folder)
         self._folder.mkdir(parents=True, exist_ok=True)
         self._wanted = episode_trigger

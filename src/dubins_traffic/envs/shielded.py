@@ -46,9 +46,7 @@ class Shielded(BaseParallelWrapper[str, Any, Any]):
         super().__init__(env)
         base = cast(object, env.unwrapped)
         if not isinstance(base, TrafficParallelEnv):
-            raise InputError(
-                "no shield", field="env", value=type(base).__name__, expected="a TrafficParallelEnv"
-            )
+            raise InputError("no shield", field="env", value=type(base).__name__, expected="a TrafficParallelEnv")
         base.shield(base.possible_agents if agents is None else agents, overtakes)
 
 

@@ -77,9 +77,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
         self._interventions: int | None = None
         self._view: TrialView | None = None
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[Any, dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
         """Begin the next episode; with a seed its first one, or that which ``options["episode"]`` names.
 
         Without a seed ever given one is drawn.
@@ -165,13 +163,7 @@ class TrafficEnv(gymnasium.Env[Any, Any]):
 
     def _observed(self) -> Any:
         if self._view is None:
-            return observed(
-                self.settings.observation, self.settings.layout, self.fleet.board.arrays["flat"][0]
-            )
+            return observed(self.settings.observation, self.settings.layout, self.fleet.board.arrays["flat"][0])
         observation = self._view.observe()  # its scan is the one that the laser has made in between
         bank, row = self.fleet.seat(0)
-        return (
-            observation
-            if observation.scan is None
-            else observation._replace(scan=bank.outlook.ranges[row].copy())
-        )
+        return observation if observation.scan is None else observation._replace(scan=bank.outlook.ranges[row].copy())

@@ -122,9 +122,7 @@ def weights_of(given: Mapping[str, float] | str | None) -> tuple[Floats, Floats]
     if given == SCORE:
         given = dict.fromkeys((*TERMS, DEBT), 0.0) | {TERMS[TERM.EARLY]: 1.0}
     if isinstance(given, str):
-        raise InputError(
-            "no such reward", field="reward", value=given, expected=f"{SCORE}, or weights by term"
-        )
+        raise InputError("no such reward", field="reward", value=given, expected=f"{SCORE}, or weights by term")
     weights = _weighted({**WEIGHTS, DEBT: 1.0}, given or {}, "reward")
     debts = [weights[DEBT] * DEBTS.get(name, 0.0) for name in TERMS]
     return np.array([weights[name] for name in TERMS]), np.array(debts)

@@ -90,13 +90,9 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
     ) -> None:
         if observation not in VECTORIZED:
             expected = " or ".join(VECTORIZED)
-            raise InputError(
-                "can't be a vector environment", field="observation", value=observation, expected=expected
-            )
+            raise InputError("can't be a vector environment", field="observation", value=observation, expected=expected)
         if isinstance(num_envs, bool) or num_envs < 1:
-            raise InputError(
-                "can't be a vector environment", field="num_envs", value=num_envs, expected=">= 1"
-            )
+            raise InputError("can't be a vector environment", field="num_envs", value=num_envs, expected=">= 1")
         self.settings = Settings(config, observation, action, frame_skip, reward, cars, levels, formulas)
         self.num_envs, self.render_mode = num_envs, render_mode
         self._renderer = Renderer(render_mode, width, height)
@@ -197,9 +193,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
             If it acts on all environments at once.
         """
         if name in TOGETHER:
-            raise DubinsTrafficError(
-                f"{name}: acts on all environments at once: call it on the vector environment"
-            )
+            raise DubinsTrafficError(f"{name}: acts on all environments at once: call it on the vector environment")
         if name == "trial":
             return tuple(self.fleet.instance(env) for env in range(self.num_envs))
         found = getattr(self, name)
@@ -242,9 +236,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         if not self.settings.formulas:
             return {}
         each = [self.fleet.states(env) for env in range(self.num_envs)]
-        return {
-            "formulas": {name: np.array([states[name] for states in each]) for name in self.settings.formulas}
-        }
+        return {"formulas": {name: np.array([states[name] for states in each]) for name in self.settings.formulas}}
 
     def _ended(self, some: Sequence[int]) -> dict[str, Any]:
         """Return the infos of episodes that have ended."""
@@ -253,9 +245,7 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
         outcomes = self._spread(some, "outcome", self.fleet.outcomes(some))
         return outcomes | self._begun(some)
 
-    def _final(
-        self, over: Bools, ended: Sequence[int], info: dict[str, Any], last: dict[str, Any]
-    ) -> dict[str, Any]:
+    def _final(self, over: Bools, ended: Sequence[int], info: dict[str, Any], last: dict[str, Any]) -> dict[str, Any]:
         """Return the last observations and infos of episodes that have ended in this step."""
         flat = self.fleet.board.arrays["flat"]
         kind, layout = self.settings.observation, self.settings.layout

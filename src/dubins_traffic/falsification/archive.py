@@ -217,9 +217,7 @@ def opened(folder: Path, settings: Any, *, resume: bool) -> Generator[Archive]:
         if state is None and (archive.cases or any((folder / name).exists() for name in (REPORT, JOURNAL))):
             raise InputError("holds files that are no search's", file=str(folder), expected="a new folder")
         if state is not None and not resume:
-            raise InputError(
-                "holds a search", file=str(folder), expected="a new folder; --resume goes on with it"
-            )
+            raise InputError("holds a search", file=str(folder), expected="a new folder; --resume goes on with it")
         if state is not None and state.get("settings") != settings:
             changed = [name for name in settings if settings[name] != state.get("settings", {}).get(name)]
             raise InputError(

@@ -81,9 +81,7 @@ class Case:
         extra = {key: value for key, value in self.instance.extra.items() if key != KEY}
         document = instance_to_document(replace(self.instance, extra={**extra, KEY: asdict(self.story)}))
         return (
-            "{\n"
-            + ",\n".join(f" {json.dumps(key)}: {json.dumps(entry)}" for key, entry in document.items())
-            + "\n}\n"
+            "{\n" + ",\n".join(f" {json.dumps(key)}: {json.dumps(entry)}" for key, entry in document.items()) + "\n}\n"
         )
 
     def write(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
@@ -112,9 +110,7 @@ def case_of(instance: Instance, name: str | None = None) -> Case:
         if story.manoeuvre.upper() not in Manoeuvre.__members__:
             raise InputError("no manoeuvre", file=name, field=f"{KEY}.manoeuvre", value=story.manoeuvre)
     except (TypeError, AttributeError):
-        raise InputError(
-            "not a case", file=name, field=KEY, value=sorted(document), expected=expected
-        ) from None
+        raise InputError("not a case", file=name, field=KEY, value=sorted(document), expected=expected) from None
     return Case(instance, story)
 
 
@@ -124,9 +120,7 @@ def _check_kinds(story: Story, file: str | None) -> None:
         value = getattr(story, name)
         allowed = (int, float) if kind is float else kind
         if not isinstance(value, allowed) or isinstance(value, bool):
-            raise InputError(
-                "of the wrong kind", file=file, field=f"{KEY}.{name}", value=value, expected=kind.__name__
-            )
+            raise InputError("of the wrong kind", file=file, field=f"{KEY}.{name}", value=value, expected=kind.__name__)
 
 
 def sentence_of(record: Record, score: Score, breach: Violation) -> str:
@@ -185,11 +179,7 @@ def _entry(record: Record, breach: Violation) -> str:
     if breach.rule == "3.clear":
         inside = [names[n] for n in range(1, len(names)) if crosses[n] == vertex]
         return f"while {' and '.join(inside) or 'another car'} was in it"
-    waiting = [
-        names[n]
-        for n in range(1, len(names))
-        if bits[n] & FLAG.STOPPED and _heads(record, n, before) == vertex
-    ]
+    waiting = [names[n] for n in range(1, len(names)) if bits[n] & FLAG.STOPPED and _heads(record, n, before) == vertex]
     return f"before its turn, while {' and '.join(waiting) or 'another car'} waited there"
 
 
@@ -212,9 +202,7 @@ def _crossing(breach: Violation) -> str:
 def _road(breach: Violation) -> str:
     segment = breach.where.segment
     return (
-        "its road"
-        if segment is None
-        else f"the road from ({segment[0]}, {segment[1]}) to ({segment[2]}, {segment[3]})"
+        "its road" if segment is None else f"the road from ({segment[0]}, {segment[1]}) to ({segment[2]}, {segment[3]})"
     )
 
 
@@ -351,15 +339,11 @@ def write_page(
     name = name_of(driver)
     judged = judge(case.instance, driver_of(driver), name)
     record, verdict = judged.record, judged.score.verdict
-    rules = (
-        [] if verdict is None else [broken.rule for broken in verdict.violations if broken.car == EGO_NAME]
-    )
+    rules = [] if verdict is None else [broken.rule for broken in verdict.violations if broken.car == EGO_NAME]
     summary = {
         "rule": case.story.rule,
         "what happens": case.story.sentence,
         "controller": name,
         "broken by the ego": ", ".join(dict.fromkeys(rules)) or "nothing",
     }
-    write_replay(
-        path, record.instance, record.frames, record.ending, summary, (), verdict, overwrite=overwrite
-    )
+    write_replay(path, record.instance, record.frames, record.ending, summary, (), verdict, overwrite=overwrite)

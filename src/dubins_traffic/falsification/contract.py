@@ -96,9 +96,7 @@ def provocation(verdict: Verdict, instance: Instance) -> Violation | None:
     return next((violation for violation in at_first if violation.car in lawful), None)
 
 
-def _longest_wait(
-    verdict: Verdict, passages: Passages, trial: int, instance: Instance
-) -> tuple[float, int] | None:
+def _longest_wait(verdict: Verdict, passages: Passages, trial: int, instance: Instance) -> tuple[float, int] | None:
     """Return by how much the longest time without a visit stayed below its limit, s, and the frame in which it was up.
 
     None without a limit, and of a trial that is not longer. Time counts while nobody has broken anything.
@@ -124,9 +122,7 @@ def breach_of(target: str, tick: int, verdict: Verdict, record: Record) -> Viola
     if target == PROVOKED:
         provoked = provocation(verdict, record.instance)
         if provoked is not None:
-            return Violation(
-                target, provoked.car, provoked.time, provoked.tick, provoked.since, provoked.where
-            )
+            return Violation(target, provoked.car, provoked.time, provoked.tick, provoked.since, provoked.where)
     x, y = float(frames.x[tick, EGO]), float(frames.y[tick, EGO])
     since = tick - 1 - _ticks(limit_of(record.instance.problem) or 0.0, frames.rate)
     return Violation(
@@ -143,13 +139,9 @@ def sentence_of(verdict: Verdict | None, breach: Violation) -> str:
     """Return who did what when in a trial in which the contract was broken."""
     when = f"At {breach.time:.2f} s"
     if breach.rule == BLOCKED:
-        return (
-            f"{when} the ego had visited no goal since {breach.since:.2f} s, though nobody had broken a rule."
-        )
+        return f"{when} the ego had visited no goal since {breach.since:.2f} s, though nobody had broken a rule."
     broken = (
-        []
-        if verdict is None
-        else [o.rule for o in verdict.violations if o.tick == breach.tick and o.car == breach.car]
+        [] if verdict is None else [o.rule for o in verdict.violations if o.tick == breach.tick and o.car == breach.car]
     )
     return f"{when} {breach.car}, which keeps the law, broke {' and '.join(broken)}, though the ego had broken nothing."
 
@@ -199,9 +191,7 @@ def first_overdue(record: Record, limit: float) -> Overdue | None:
     goals = tuple(dict.fromkeys(record.instance.problem.goals))
     for goal in range(len(goals)):
         ticks = [0, *(tick for tick, which in judging.visits if which == goal), final]
-        over += [
-            (since + allowed + 1, goal, since) for since, tick in pairwise(ticks) if tick - since > allowed
-        ]
+        over += [(since + allowed + 1, goal, since) for since, tick in pairwise(ticks) if tick - since > allowed]
     if not over:
         return None
     tick, goal, since = min(over)

@@ -140,9 +140,7 @@ def possible(instances: Iterable[Instance]) -> list[Cell]:
                     cells |= {Cell(rule, manoeuvre, degree) for manoeuvre in through if degree >= least}
                 else:
                     at_discs = through if rule.startswith("1.") else ()
-                    cells |= {
-                        Cell(rule, manoeuvre, degree) for manoeuvre in (*ALONG.get(rule, ()), *at_discs)
-                    }
+                    cells |= {Cell(rule, manoeuvre, degree) for manoeuvre in (*ALONG.get(rule, ()), *at_discs)}
     return sorted(cells, key=lambda cell: cell.number)
 
 

@@ -78,9 +78,7 @@ def combined(runs: Sequence[Split], particles: int) -> Replicas:
     counted = clopper_pearson(sum(run.counted for run in runs), len(runs) * particles)
     # Equal estimates show no spread, which says nothing of it: then Monte Carlo's trials have the word.
     flat = len(set(probabilities)) == 1
-    interval = (
-        counted if branches == 0 or mean == 0.0 else (mean, mean) if flat else korn_graubard(probabilities)
-    )
+    interval = counted if branches == 0 or mean == 0.0 else (mean, mean) if flat else korn_graubard(probabilities)
     if 2 * extinct > len(runs) or flat:
         interval = min(interval[0], counted[0]), max(interval[1], counted[1])
     repeated = sum(run.repeated for run in runs) / branches if branches else 0.0
@@ -238,9 +236,7 @@ def estimate(
         expected = f"one of {', '.join(TARGETS)}"
         raise InputError("no rule of the ego's", file="--event", value=event, expected=expected)
     if method not in METHODS:
-        raise InputError(
-            "no such method", file="--method", value=method, expected=f"one of {', '.join(METHODS)}"
-        )
+        raise InputError("no such method", file="--method", value=method, expected=f"one of {', '.join(METHODS)}")
     if not math.isfinite(below):
         raise InputError("not a margin", file="--below", value=below, expected="a finite number")
     config = prepared(config, duration, {})
@@ -283,9 +279,7 @@ def by_counting(
     known = counts.trials - left_out
     rest = (), left_out, counts.fault_notice()
     if not known:
-        return Probability(
-            "monte-carlo", words(event, below), math.nan, (0.0, 1.0), None, counts.trials, 0, 0, *rest
-        )
+        return Probability("monte-carlo", words(event, below), math.nan, (0.0, 1.0), None, counts.trials, 0, 0, *rest)
     return Probability(
         "monte-carlo", words(event, below), happened / known, clopper_pearson(happened, known),
         wilson(happened, known), counts.trials, happened, counts.discarded, *rest,

@@ -84,11 +84,7 @@ class Passages:
         discs: list[int] = self.disc[rows].tolist()
         first: list[int] = self.first[rows].tolist()
         before = [-2, *discs][: len(discs)]
-        return [
-            tick
-            for tick, disc, last in zip(first, discs, before, strict=True)
-            if disc in goals and disc != last
-        ]
+        return [tick for tick, disc, last in zip(first, discs, before, strict=True) if disc in goals and disc != last]
 
     def situations(self, trials: int) -> list[tuple[int, ...]]:
         """Return for each of `trials` trials the numbers of the situations in it, ascending.
@@ -122,9 +118,7 @@ class Passages:
             "3.clear": entered & _held(came, BARRED),
         }
         within = self.manoeuvre * DEGREES + self.degree
-        numbers = [
-            EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[rows] for rule, rows in tested.items()
-        ]
+        numbers = [EGO_RULES.index(rule) * MANOEUVRES * DEGREES + within[rows] for rule, rows in tested.items()]
         places = [self.trial[rows] for rows in tested.values()]
         number, trial = np.concatenate(numbers), np.concatenate(places)
         order = np.lexsort((number, trial))
@@ -264,8 +258,6 @@ def _manoeuvres(trial: Ints, lane: Ints, flags: Ints, ground: _Ground) -> tuple[
         Manoeuvre.DRIVING,
     )
     in_disc = lane < 0
-    degree = np.where(
-        in_disc, np.where(came >= 0, ground.head[before], ground.tail[after]), ground.head[present]
-    )
+    degree = np.where(in_disc, np.where(came >= 0, ground.head[before], ground.tail[after]), ground.head[present])
     unknown = in_disc & (came < 0) & (goes < 0)
     return np.where(in_disc, through, along), np.where(unknown, 0, degree)

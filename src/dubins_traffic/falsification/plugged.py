@@ -111,7 +111,7 @@ class Plugged:
         """Return what is proposed, looked at."""
         history = tuple(self._history)
         given: Any = self._asked("propose", lambda: list(self._sampler.propose(history)))
-        return [self._point(own) for own in given]
+        return [self._point(point) for point in given]
 
     def _point(self, given: Any) -> tuple[float, ...]:
         size = self._space.size
@@ -120,7 +120,7 @@ class Plugged:
         except (TypeError, ValueError):
             point = np.zeros(0)
         if point.shape != (size,) or not bool(((point >= 0.0) & (point <= 1.0)).all()):
-            wrong = next((own for own in point.ravel().tolist() if not 0.0 <= own <= 1.0), given)
+            wrong = next((number for number in point.ravel().tolist() if not 0.0 <= number <= 1.0), given)
             value = f"{point.size} numbers" if point.shape != (size,) else wrong
             raise self._refused("proposes no point", value, f"{size} numbers from 0 to 1")
         return tuple(point.tolist())
@@ -130,7 +130,7 @@ class Plugged:
         if tried.discarded or tried.faulty:
             margin = None
         else:
-            margin = min(tried.margins.get(own, math.inf) for own in self._space.targets)
+            margin = min(tried.margins.get(target, math.inf) for target in self._space.targets)
         self._hear(margin)
 
     def _hear(self, margin: float | None) -> None:
@@ -184,9 +184,7 @@ class Plugged:
         if isinstance(error, InputError):
             raise error
         if error is not None:
-            raise self._refused(
-                f"{method} raised {outside.plainly(error)}", self._spec, "an answer"
-            ) from error
+            raise self._refused(f"{method} raised {outside.plainly(error)}", self._spec, "an answer") from error
         return cast("Answer", answer)
 
     def _refused(self, problem: str, value: object, expected: str) -> InputError:

@@ -106,9 +106,7 @@ def outcomes(cases: Sequence[tuple[Path, Case]], controller: str | Maker | Remot
         outcome = verdict.verdict.value if fault is None else fault.end.value
         of_it = [broken for broken in breaches if broken.rule == case.story.rule] or breaches
         sentence = sentence_of(judged.record, judged.score, of_it[0]) if breaches else ""
-        yield CaseOutcome(
-            path, case, outcome, _rules(breaches), sentence, "" if fault is None else str(fault)
-        )
+        yield CaseOutcome(path, case, outcome, _rules(breaches), sentence, "" if fault is None else str(fault))
 
 
 def _rules(breaches: Sequence[Violation]) -> tuple[str, ...]:

@@ -132,9 +132,7 @@ class Remote:
 
     def _opened(self) -> Iterator[Result]:
         folder = Path(self._held.enter_context(tempfile.TemporaryDirectory(prefix="dubins-traffic-")))
-        plan = SessionPlan(
-            self._supply, None, None, None, (), folder, None, shield=self._shield, say=self._tell
-        )
+        plan = SessionPlan(self._supply, None, None, None, (), folder, None, shield=self._shield, say=self._tell)
         entry = TRANSPORTS[self._way.transport]
         session: Any = entry.runner(plan, self._way.pace(), **self._way.options)
         self._held.callback(session.close)

@@ -47,9 +47,7 @@ class Stream(IntEnum):
     """Whether a trial is drawn or a child, and whose."""
 
 
-def prepared(
-    configuration: Configuration, duration: float | None, formulas: Mapping[str, str]
-) -> Configuration:
+def prepared(configuration: Configuration, duration: float | None, formulas: Mapping[str, str]) -> Configuration:
     """Return a configuration for a search: judged by the rules, of trials that collisions don't end.
 
     Parameters

@@ -113,7 +113,7 @@ class Least:
     def cases(self, source: Source, crew: Runner) -> dict[str, Case]:
         """Return the trials as cases, by name, judged afresh; without those whose assumption does not hold."""
         found: dict[str, Case] = {}
-        for instance in source.build([own.genome for own in self._kept]):
+        for instance in source.build([kept_case.genome for kept_case in self._kept]):
             judged = judge(instance, crew.make, crew.name)
             verdict = judged.score.verdict
             if verdict is None or verdict.assumption_broken:
@@ -124,11 +124,11 @@ class Least:
 
     def state(self) -> Any:
         """Return what a search that is resumed needs, for JSON."""
-        return [[own.done, own.number, own.genome.to_json()] for own in self._kept]
+        return [[kept_case.done, kept_case.number, kept_case.genome.to_json()] for kept_case in self._kept]
 
     def restore(self, state: Any) -> None:
         """Take over what `state` gave."""
-        self._kept = [_Kept(done, number, Genome.from_json(own)) for done, number, own in state]
+        self._kept = [_Kept(done, number, Genome.from_json(document)) for done, number, document in state]
 
 
 def _story(score: Score, name: str) -> Story:
@@ -233,13 +233,13 @@ class Search:
         journal = self.archive.journal
         count = len(numbers)
         known = map(journal.known, numbers, genomes)
-        found = {k: own for k, own in enumerate(known) if own is not None}
+        found = {k: kept for k, kept in enumerate(known) if kept is not None}
         left = [k for k in range(count) if k not in found]
         self.finished = self.counts.trials + len(found)
         for part in self._crew.run([instances[k] for k in left]):
             with WHOLE:
-                came = {left[k]: own for k, own in part.items()}
-                journal.keep((numbers[k], genomes[k], own) for k, own in came.items())
+                came = {left[k]: result for k, result in part.items()}
+                journal.keep((numbers[k], genomes[k], result) for k, result in came.items())
                 found |= came
                 self.finished += len(part)
             if len(found) < count:
@@ -250,12 +250,12 @@ class Search:
         self, numbers: range, genomes: Sequence[Genome], instances: Sequence[Instance], tried: Sequence[Tried]
     ) -> None:
         """Count the trials of a generation, and tell the strategy of them."""
-        places = {id(own.problem.network): own for own in instances}
+        places = {id(instance.problem.network): instance for instance in instances}
         self._expected.update(cell.number for cell in possible(places.values()))
-        for number, genome, own in zip(numbers, genomes, tried, strict=True):
-            self._least.take(number, genome, own)
-            self.counts.take_fault(number, own.fault)
-            self._strategy.tell(number, genome, own, self._count(own))
+        for number, genome, tried_one in zip(numbers, genomes, tried, strict=True):
+            self._least.take(number, genome, tried_one)
+            self.counts.take_fault(number, tried_one.fault)
+            self._strategy.tell(number, genome, tried_one, self._count(tried_one))
         self.counts.trials += len(numbers)
 
     def _count(self, tried: Tried) -> bool:
@@ -280,8 +280,8 @@ class Search:
         """Judge the failures of new kinds afresh; return those that stand with their trials, and how many don't."""
         fresh: dict[str, tuple[int, Case]] = {}
         unconfirmed = 0
-        for number, instance, own in zip(numbers, instances, tried, strict=True):
-            for cell in self._wanted(own):
+        for number, instance, tried_one in zip(numbers, instances, tried, strict=True):
+            for cell in self._wanted(tried_one):
                 if cell.name in self.archive.cases or cell.name in fresh:
                     continue
                 case = case_in(instance, cell, self._crew.make, self._crew.name)
@@ -419,9 +419,7 @@ def falsify(
         On Ctrl-C; what has been found is kept, and no trial that is finished is run again by `resume`.
     """
     if most < 1:
-        raise InputError(
-            "not so many trials", file="falsify", field="most", value=most, expected="at least 1"
-        )
+        raise InputError("not so many trials", file="falsify", field="most", value=most, expected="at least 1")
     if seconds is not None and not seconds >= 0.0:
         raise InputError("not a time", file="--seconds", value=seconds, expected="a number >= 0")
     own = configuration if isinstance(configuration, Configuration) else load_config(configuration)
@@ -455,9 +453,7 @@ def falsify(
 def _run(search: Search, trials: int | None, seconds: float | None) -> None:
     """Run generations until there have been enough trials, or time is up."""
     began = saved = time.monotonic()
-    while (trials is None or search.counts.trials < trials) and (
-        seconds is None or time.monotonic() - began < seconds
-    ):
+    while (trials is None or search.counts.trials < trials) and (seconds is None or time.monotonic() - began < seconds):
         if not search.generation(search.most if trials is None else trials - search.counts.trials):
             return
         if time.monotonic() - saved > SAVE:

@@ -262,9 +262,7 @@ class _Shrinker:
     def _less(self, failing: Judged, way: Way) -> tuple[str, Judged] | None:
         """Return the first instance with one thing less in which the breach stands."""
         record = failing.record
-        tried = [
-            (what, smaller) for what, smaller in way(record.instance, record.frames) if _is_sound(smaller)
-        ]
+        tried = [(what, smaller) for what, smaller in way(record.instance, record.frames) if _is_sound(smaller)]
         if not tried:
             return None
         findings = in_order(self._runner.attempt([smaller for _, smaller in tried]))

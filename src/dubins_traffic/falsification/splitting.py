@@ -135,9 +135,7 @@ class Run:
         Draws survivors and seeds.
     """
 
-    def __init__(
-        self, particles: list[Particle], paths: Paths, below: float, dice: np.random.Generator
-    ) -> None:
+    def __init__(self, particles: list[Particle], paths: Paths, below: float, dice: np.random.Generator) -> None:
         self._particles, self._paths, self._below, self._dice = particles, paths, below, dice
         self._counted = int((paths.margins <= below).sum())
         self._most = max(1, round(GIVEN_UP * len(particles)))
@@ -233,9 +231,7 @@ def split(
     return [run.result() for run in runs]
 
 
-def follow(
-    particles: Sequence[Particle], company: Company, seeds: Sequence[int], every: int, ticks: int
-) -> Paths:
+def follow(particles: Sequence[Particle], company: Company, seeds: Sequence[int], every: int, ticks: int) -> Paths:
     """Run particles from their first frames, in which the first particles (`company`, of `seeds`) stay.
 
     Checkpoint 0 is the first frame, and there is one every `every` ticks, the last at the end.
@@ -322,9 +318,7 @@ def coming(group: Group) -> Floats:
     """
     state, reach = group.state, group.world.cars.reach
     x, y = (array[:, 1:] - array[:, :1] for array in (state.x, state.y))
-    vx, vy = (
-        velocity[:, 1:] - velocity[:, :1] for velocity in (state.speed * state.c, state.speed * state.s)
-    )
+    vx, vy = (velocity[:, 1:] - velocity[:, :1] for velocity in (state.speed * state.c, state.speed * state.s))
     places: int = state.x.shape[1]
     absent = np.arange(1, places) >= state.count[:, None]
     least = np.full(len(x), np.inf)

@@ -85,8 +85,7 @@ class Tried:
     def from_json(document: Mapping[str, Any]) -> Tried:
         """Return what the JSON object says."""
         cells = tuple(
-            (Cell(rule, Manoeuvre(manoeuvre), degree), tick)
-            for rule, manoeuvre, degree, tick in document["cells"]
+            (Cell(rule, Manoeuvre(manoeuvre), degree), tick) for rule, manoeuvre, degree, tick in document["cells"]
         )
         numbers = {name: tuple(document[name]) for name in ("situations", "exercised")}
         values: dict[str, Any] = {**document, "cells": cells, **numbers}
@@ -161,9 +160,7 @@ class TrialRunner:
         if self.cancelled():
             raise KeyboardInterrupt
 
-    def _together(
-        self, instances: Sequence[Instance], way: Way, places: Mapping[int, int]
-    ) -> dict[int, Tried]:
+    def _together(self, instances: Sequence[Instance], way: Way, places: Mapping[int, int]) -> dict[int, Tried]:
         """Run trials that are stepped together; return what came of them, by the places of their instances."""
         numbers = range(self._number, self._number + len(instances))
         self._number = numbers.stop
@@ -177,8 +174,7 @@ class TrialRunner:
         networks = [instance.problem.network for instance in group.instances]
         passages = find_passages(ego["lane"], ego["bits"], frames, networks)
         tried = [
-            tried_of(outcome.score, outcome.ending, passages, b, outcome.instance)
-            for b, outcome in enumerate(outcomes)
+            tried_of(outcome.score, outcome.ending, passages, b, outcome.instance) for b, outcome in enumerate(outcomes)
         ]
         whole = with_passages(tried, passages, group.instances[0])
         return {places[id(outcome.instance)]: came for outcome, came in zip(outcomes, whole, strict=True)}
@@ -225,16 +221,12 @@ def judged_record(record: Record) -> tuple[Score, Passages]:
     return score(record), trace.passages()
 
 
-def tried_of(
-    score: Score, ending: Ending | None, passages: Passages, trial: int, instance: Instance
-) -> Tried:
+def tried_of(score: Score, ending: Ending | None, passages: Passages, trial: int, instance: Instance) -> Tried:
     """Return what a search keeps of the trial of an instance that has been judged: number `trial` of `passages`."""
     verdict = score.verdict
     fault = str(ending) if ending is not None and ending.end in FAULTS else ""
     margins = {
-        f"{FORMULA} {formula.name}": formula.robustness
-        for formula in score.formulas
-        if formula.robustness is not None
+        f"{FORMULA} {formula.name}": formula.robustness for formula in score.formulas if formula.robustness is not None
     }
     margins[DONE] = score.counted_rounds + score.goals_visited + METRE * score.driven.distance_m
     if verdict is None:
@@ -242,9 +234,7 @@ def tried_of(
     margins |= {rule: value for rule, value in verdict.robustness.items() if value is not None}
     late = spare(instance.problem, verdict, ending)
     margins |= {} if late is None else {LIVENESS: late}
-    breaches = [
-        broken for broken in verdict.violations if broken.car == EGO_NAME and broken.rule in EGO_RULES
-    ]
+    breaches = [broken for broken in verdict.violations if broken.car == EGO_NAME and broken.rule in EGO_RULES]
     first = {broken.rule: broken.tick for broken in reversed(breaches)}
     for rule in first:
         margins[rule] = min(margins.get(rule, -0.0), BROKEN)
@@ -277,8 +267,7 @@ def with_passages(tried: Sequence[Tried], passages: Passages, instance: Instance
     degree = RuleParameters.from_mapping(instance.problem.rules).crossing_degree
     met, tested = passages.situations(len(tried)), passages.exercised(len(tried), degree)
     return [
-        replace(each, situations=met[b], exercised=() if each.faulty else tested[b])
-        for b, each in enumerate(tried)
+        replace(each, situations=met[b], exercised=() if each.faulty else tested[b]) for b, each in enumerate(tried)
     ]
 
 
@@ -393,24 +382,18 @@ def name_of(controller: str | Maker | Remote) -> str:
     """Return what records and cases call a controller."""
     if isinstance(controller, str):
         return controller
-    return (
-        controller.name if isinstance(controller, Remote) else getattr(controller, "__name__", "controller")
-    )
+    return controller.name if isinstance(controller, Remote) else getattr(controller, "__name__", "controller")
 
 
 @contextlib.contextmanager
-def runner_of(
-    controller: str | Maker | Remote, name: str, workers: int, ray: str | None
-) -> Generator[Runner]:
+def runner_of(controller: str | Maker | Remote, name: str, workers: int, ray: str | None) -> Generator[Runner]:
     """Yield who runs the trials of a search with a controller: `workers` processes, or a Ray cluster at an address."""
     if workers == 1 and ray is None:
         yield LocalRunner(controller, name)
         return
     if not isinstance(controller, str):
         expected = "a controller given by name, not one elsewhere"
-        raise InputError(
-            "can't be made by other processes", field="controller", value=name, expected=expected
-        )
+        raise InputError("can't be made by other processes", field="controller", value=name, expected=expected)
     if ray is not None:
         check_address(ray)
     with contextlib.closing(crew_at(ray, workers)) as crew:

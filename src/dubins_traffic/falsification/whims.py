@@ -82,17 +82,17 @@ def mutated(dice: np.random.Generator, table: Floats, problem: Problem) -> Float
         return np.insert(table, k, _row(dice, problem), axis=0)
     if kind < 0.3 and len(table) > 1:
         return np.delete(table, k, axis=0)
-    own = table.copy()
+    changed = table.copy()
     if kind < 0.5:
-        own[k] = _row(dice, problem)
-        return own
+        changed[k] = _row(dice, problem)
+        return changed
     bounds = problem.car.bounds
     least = np.array([SHORT, 0.0, -bounds.speed, -bounds.yaw_rate, 0.0])
     most = np.array([LONG, 1.0, bounds.speed, bounds.yaw_rate, 1.0])
-    column = int(dice.choice(_movable(own[k], problem)))
-    moved = own[k, column] + STEP * dice.random() * (most - least)[column] * dice.standard_normal()
-    own[k, column] = min(max(moved, least[column]), most[column])
-    return own
+    column = int(dice.choice(_movable(changed[k], problem)))
+    moved = changed[k, column] + STEP * dice.random() * (most - least)[column] * dice.standard_normal()
+    changed[k, column] = min(max(moved, least[column]), most[column])
+    return changed
 
 
 def _movable(row: Floats, problem: Problem) -> list[int]:
@@ -110,9 +110,9 @@ def reductions(table: Floats) -> Iterator[Floats]:
     law = np.array([1.0, 0.0, 0.0, 0.0])
     for k in range(len(table)):
         if (table[k, 1:] != law).any():
-            own = table.copy()
-            own[k, 1:] = law
-            yield own
+            changed = table.copy()
+            changed[k, 1:] = law
+            yield changed
 
 
 def with_whims(instance: Instance, tables: Mapping[int, Floats]) -> Instance:

@@ -147,17 +147,15 @@ class Contacts:
 
     def collect(self, tick: int, rows: Floats, state: State) -> tuple[Contact, ...]:
         """Return the new contacts of the tick that ends in frame `tick`, whose state is given; earliest first."""
-        found: list[Contact] = []
+        contacts: list[Contact] = []
         for row in sorted(rows.tolist(), key=lambda row: (row[0], row[1], row[2])):
             pair = (int(row[1]), int(row[2]))
             if pair not in self._touching:
                 self._touching.add(pair)
-                found.append(self._contact(tick, row))
+                contacts.append(self._contact(tick, row))
         if self._touching:
-            self._touching = {
-                pair for pair in self._touching if self._bodies.separation(state, *pair)[0] < PARTED
-            }
-        return tuple(found)
+            self._touching = {pair for pair in self._touching if self._bodies.separation(state, *pair)[0] < PARTED}
+        return tuple(contacts)
 
     def _contact(self, tick: int, row: list[float]) -> Contact:
         point, normal = (row[3], row[4]), (row[5], row[6])

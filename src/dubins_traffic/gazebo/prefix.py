@@ -142,9 +142,7 @@ def _unfit(problem: str, folder: Path) -> InputError:
     command = COMMAND
     if folder != place():
         command += f" --prefix {folder}"
-    return InputError(
-        problem, file=str(folder), field="simulator", value="gazebo", expected=f"`{command}` first"
-    )
+    return InputError(problem, file=str(folder), field="simulator", value="gazebo", expected=f"`{command}` first")
 
 
 SOURCES: Final = Path(__file__).with_name("plugin")
@@ -201,11 +199,7 @@ def build(prefix: Path, root: Path | None) -> None:
 
 def _flags(root: Path) -> list[str]:
     include = root / "usr" / "include"
-    below = (
-        sorted(include.glob("gazebo-*"))
-        + sorted(include.glob("sdformat-*"))
-        + sorted(include.glob("ignition/*"))
-    )
+    below = sorted(include.glob("gazebo-*")) + sorted(include.glob("sdformat-*")) + sorted(include.glob("ignition/*"))
     folders = [include, *below, *(folder / "gazebo" for folder in below if folder.name.startswith("gazebo-"))]
     return [f"-I{folder}" for folder in folders]
 

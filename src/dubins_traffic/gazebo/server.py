@@ -191,9 +191,7 @@ class Server:
 
     @staticmethod
     def _surroundings(installation: Installation, port: int, folder: str) -> dict[str, str]:
-        kept = {
-            key: value for key, value in os.environ.items() if not key.startswith(("GAZEBO_", "LD_PRELOAD"))
-        }
+        kept = {key: value for key, value in os.environ.items() if not key.startswith(("GAZEBO_", "LD_PRELOAD"))}
         return kept | installation.environment() | {
             "HOME": folder,
             "GAZEBO_MASTER_URI": f"http://{HOST}:{port}",

@@ -72,9 +72,7 @@ class Gazebo:
     ) -> None:
         self._installation = find(prefix)
         if show and not os.environ.get("DISPLAY"):
-            raise InputError(
-                "no display to show Gazebo on", file="DISPLAY", expected="a display, or no --gui"
-            )
+            raise InputError("no display to show Gazebo on", file="DISPLAY", expected="a display, or no --gui")
         self._show = show
         self._longest = step
         self._port = port
@@ -152,9 +150,7 @@ class Gazebo:
         except PeerError:
             if self._tick:
                 raise
-            return np.full(
-                len(rays), longest
-            )  # a world that is only shown: the trial's first step names its end
+            return np.full(len(rays), longest)  # a world that is only shown: the trial's first step names its end
 
     def close(self) -> None:
         """End the server."""

@@ -264,12 +264,8 @@ def _caster(place: str, x: float) -> Element:
 
 def _wheel(side: str, y: float) -> Element:
     moment = 0.4 * WHEEL_MASS * WHEEL_RADIUS * WHEEL_RADIUS
-    rolls = tag(
-        "collision", tag("max_contacts", 1), sphere(WHEEL_RADIUS), surface(GRIP, GROUND), name="rolls"
-    )
-    seen = visual(
-        "wheel", numbers("pose", 0, 0, 0, 1.5707963267948966, 0, 0), cylinder(WHEEL_RADIUS, 0.02), DARK
-    )
+    rolls = tag("collision", tag("max_contacts", 1), sphere(WHEEL_RADIUS), surface(GRIP, GROUND), name="rolls")
+    seen = visual("wheel", numbers("pose", 0, 0, 0, 1.5707963267948966, 0, 0), cylinder(WHEEL_RADIUS, 0.02), DARK)
     return tag(
         "link",
         pose(0.0, y, WHEEL_RADIUS),

@@ -329,9 +329,7 @@ def bag_to_records(path: Path | str, output: Path | str, *, overwrite: bool = Fa
     if not bag.runs:
         raise InputError("no problem instance", file=name, expected=f"a message on {PROBLEM}")
     if "ego" not in bag.poses:
-        raise InputError(
-            "no poses of the ego", file=name, expected=f"messages on {STATES}, or of ROS 2 on /ego/odom"
-        )
+        raise InputError("no poses of the ego", file=name, expected=f"messages on {STATES}, or of ROS 2 on /ego/odom")
     records = record_paths(output, len(bag.runs), overwrite=overwrite)
     for number, (run, record) in enumerate(zip(bag.runs, records, strict=True)):
         instance = _instance(bag, run, number, name)
@@ -407,9 +405,7 @@ def _instance(bag: _BagTopics, run: _Run, number: int, file: str) -> Instance:
     """Return the instance: that of a bag written here, otherwise the problem with cars where their poses begin."""
     if run.instance is not None:
         return instance_from_document(parse_json(run.instance, file), file)
-    others = [
-        name for name in bag.poses if name != "ego" and (name in bag.twists or name.startswith("agent"))
-    ]
+    others = [name for name in bag.poses if name != "ego" and (name in bag.twists or name.startswith("agent"))]
     document = parse_json(run.text, file)
     alone = instance_from_document({**document, "version": 1, "duration": 1.0, "e-agents": []}, file)
     starts = [bag.poses[name].at(run.began) or bag.poses[name].samples[0] for name in ("ego", *others)]
@@ -486,9 +482,7 @@ def _commands(bag: _BagTopics, instance: Instance, time: int, state: State) -> n
     return commands
 
 
-def _notes(
-    run: _Run, ticks: int
-) -> tuple[Mapping[int, tuple[Contact, ...]], Mapping[int, tuple[Event, ...]], Ending]:
+def _notes(run: _Run, ticks: int) -> tuple[Mapping[int, tuple[Contact, ...]], Mapping[int, tuple[Event, ...]], Ending]:
     contacts: dict[int, tuple[Contact, ...]] = {}
     events: dict[int, tuple[Event, ...]] = {}
     ending = Ending(End.DURATION, ticks)

@@ -96,9 +96,7 @@ def log_to_records(path: Path | str, output: Path | str, *, overwrite: bool = Fa
         if ticks < 1 or ticks + 1 < len(trial.cars):
             lost = f"tick {ticks + 1} of trial {number}"
             broken.append(
-                InputError(
-                    "frames are missing", file=name, field=connection.WORLD, value=lost, expected="all ticks"
-                )
+                InputError("frames are missing", file=name, field=connection.WORLD, value=lost, expected="all ticks")
             )
             continue
         _write(trial, number, ticks, record, overwrite=overwrite)

@@ -115,9 +115,7 @@ class _Ros2BagWriter(BagWriter):
         )
         for n, rule in self._breaches.get(f, ()):
             place = float(frames.x[f, n]), float(frames.y[f, n])
-            self._put_marks(
-                marks.BREACHES, time, [marks.of_breach(f, f"{instance.names[n]}: {rule}", *place)]
-            )
+            self._put_marks(marks.BREACHES, time, [marks.of_breach(f, f"{instance.names[n]}: {rule}", *place)])
 
     def _put_transforms(self, poses: Iterable[Any], time: int) -> None:
         """Put where each car's footprint is by its odometry."""
@@ -144,9 +142,7 @@ class _Ros2BagWriter(BagWriter):
         return self._make("geometry_msgs/msg/TransformStamped", self._header(time, parent), child, moved)
 
     def _put_marks(self, topic: str, time: int, shown: Iterable[marks.Mark]) -> None:
-        self._put(
-            topic, "visualization_msgs/msg/MarkerArray", time, [self._marker(one, time) for one in shown]
-        )
+        self._put(topic, "visualization_msgs/msg/MarkerArray", time, [self._marker(one, time) for one in shown])
 
     def _marker(self, mark: marks.Mark, time: int) -> Any:
         header, nothing = self._header(time, "map"), np.zeros(0, dtype=np.uint8)

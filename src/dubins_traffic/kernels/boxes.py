@@ -191,9 +191,7 @@ def disc_contact(one: Box, drive: Drive, other: Box, its: Drive, begin: float, e
 
 
 @jit
-def _corner_motion(
-    k: int, box: Box, nx: float, ny: float, u: float, w: float
-) -> tuple[float, float, float, float]:
+def _corner_motion(k: int, box: Box, nx: float, ny: float, u: float, w: float) -> tuple[float, float, float, float]:
     """Return a corner of a box that drives at u, w: place, speed along a normal, distance from the centre."""
     x, y = corner(k, box)
     arm = sqrt((x - box.x) * (x - box.x) + (y - box.y) * (y - box.y))

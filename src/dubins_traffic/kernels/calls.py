@@ -27,11 +27,7 @@ def bound(kernel: Callable[P, R]) -> Callable[P, R]:
     -----
     What comes of it writes its arguments where the call before wrote them: a thread needs one of its own.
     """
-    return (
-        cast("Callable[P, R]", Bound(cast("Kernel[..., R]", kernel)))
-        if isinstance(kernel, Kernel)
-        else kernel
-    )
+    return cast("Callable[P, R]", Bound(cast("Kernel[..., R]", kernel))) if isinstance(kernel, Kernel) else kernel
 
 
 class Bound(Generic[R]):
@@ -82,9 +78,9 @@ def _compiled(code: Code) -> Callable[..., Any]:
         """Return the address of an array or table, as argument k from now on."""
         if kind_of(value) != kinds[k]:
             raise UnfitError(f"argument {k} is of another kind than before")
-        own: list[Any] = []
-        found = address(value, kinds[k], own)
-        kept[k] = own
+        blocks: list[Any] = []
+        found = address(value, kinds[k], blocks)
+        kept[k] = blocks
         return found
 
     frame = ctypes.create_string_buffer(8 * len(kinds))

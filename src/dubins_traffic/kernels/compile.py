@@ -247,9 +247,15 @@ class Kernel(Generic[P, R]):
     @cached_property
     def py_func(self) -> Callable[P, R]:
         """The function interpreted, with all that it calls."""
-        own = self._function
-        plain = FunctionType(own.__code__, _plain_names(own), own.__name__, own.__defaults__, own.__closure__)
-        plain.__kwdefaults__ = own.__kwdefaults__
+        function = self._function
+        plain = FunctionType(
+            function.__code__,
+            _plain_names(function),
+            function.__name__,
+            function.__defaults__,
+            function.__closure__,
+        )
+        plain.__kwdefaults__ = function.__kwdefaults__
         return cast("Callable[P, R]", plain)
 
     def code(self, kinds: tuple[Kind, ...]) -> Code | None:
@@ -284,11 +290,11 @@ class Kernel(Generic[P, R]):
     @property
     def has_source(self) -> bool:
         """Whether a builder finds the function in a file."""
-        own = self._function
+        function = self._function
         return (
-            own.__module__ != "__main__"
-            and "<locals>" not in own.__qualname__
-            and Path(own.__code__.co_filename).is_file()
+            function.__module__ != "__main__"
+            and "<locals>" not in function.__qualname__
+            and Path(function.__code__.co_filename).is_file()
         )
 
     def key(self, kinds: Sequence[Kind]) -> str:
@@ -329,12 +335,12 @@ def say(text: str) -> None:
 
 def _plain_names(function: FunctionType) -> dict[str, Any]:
     """Return the names that a kernel's function knows, with the interpreted functions for kernels."""
-    own = function.__globals__
-    known = _plain.get(id(own))
+    names = function.__globals__
+    known = _plain.get(id(names))
     if known is None:
-        known = _plain[id(own)] = {}
-        known.update(own)
-        known.update({name: value.py_func for name, value in own.items() if isinstance(value, Kernel)})
+        known = _plain[id(names)] = {}
+        known.update(names)
+        known.update({name: value.py_func for name, value in names.items() if isinstance(value, Kernel)})
     return known
 
 

@@ -63,8 +63,12 @@ def kind_of(value: object) -> Kind:
         return "row", _dtype_kind(record_layout(cast(Any, type(cast(object, value)))))
     if isinstance(value, tuple):
         kinds = tuple([kind_of(part) for part in cast("tuple[object, ...]", value)])
-        own = type(cast(object, value))
-        return ("tuple", kinds) if own is tuple else ("named", own.__module__, own.__qualname__, kinds)
+        kind_of_tuple = type(cast(object, value))
+        return (
+            ("tuple", kinds)
+            if kind_of_tuple is tuple
+            else ("named", kind_of_tuple.__module__, kind_of_tuple.__qualname__, kinds)
+        )
     if isinstance(value, bool | np.bool_):
         return TRUTH
     if isinstance(value, int):
@@ -116,10 +120,8 @@ def _dtype_kind(dtype: np.dtype[Any]) -> Any:
             raise UnfitError(f"an array of {dtype}")
         return dtype.str[1:]
     fields = cast("dict[str, Any]", dtype.fields)
-    own = [
-        (name, _dtype_kind(fields[name][0]), fields[name][1]) for name in cast("tuple[str, ...]", dtype.names)
-    ]
-    return "rows", tuple(own), dtype.itemsize, dtype.isalignedstruct
+    parts = [(name, _dtype_kind(fields[name][0]), fields[name][1]) for name in cast("tuple[str, ...]", dtype.names)]
+    return "rows", tuple(parts), dtype.itemsize, dtype.isalignedstruct
 
 
 def dtype_of(kind: Any) -> np.dtype[Any]:
@@ -131,7 +133,7 @@ def dtype_of(kind: Any) -> np.dtype[Any]:
     _, fields, size, aligned = kind
     parts = {
         "names": [name for name, _, _ in fields],
-        "formats": [dtype_of(own) for _, own, _ in fields],
+        "formats": [dtype_of(part) for _, part, _ in fields],
         "offsets": [offset for _, _, offset in fields],
         "itemsize": size,
     }

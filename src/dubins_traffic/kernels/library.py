@@ -68,9 +68,9 @@ def libraries() -> tuple[Library, ...]:
     if not levels():
         return ()
     found = [_best(IN_PACKAGE)]
-    own = base_folder() / BUILT
-    if os.environ.get(TIER) == KEPT or is_private(own):
-        found.append(_best(own))
+    folder = base_folder() / BUILT
+    if os.environ.get(TIER) == KEPT or is_private(folder):
+        found.append(_best(folder))
     return tuple(library for library in found if library is not None)
 
 
@@ -96,7 +96,7 @@ def _loaded(folder: Path, text: bytes) -> Library | None:
         path = folder / Path(manifest["file"]).name
         if hashlib.sha256(path.read_bytes()).hexdigest() != manifest["sha256"]:
             raise ValueError("its hash is another")
-        return Library(path, {symbol: own["answer"] for symbol, own in manifest["kernels"].items()})
+        return Library(path, {symbol: kernel["answer"] for symbol, kernel in manifest["kernels"].items()})
     except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
         _say_damaged(folder, error)
         return None
@@ -104,6 +104,4 @@ def _loaded(folder: Path, text: bytes) -> Library | None:
 
 @cache
 def _say_damaged(folder: Path, error: Exception) -> None:
-    print(
-        f"dubins-traffic: the library of compiled kernels in {folder} can't be used: {error}", file=sys.stderr
-    )
+    print(f"dubins-traffic: the library of compiled kernels in {folder} can't be used: {error}", file=sys.stderr)

@@ -31,9 +31,7 @@ class Code:
 
     def __init__(self, kinds: Sequence[Kind], answer: Kind, where: int) -> None:
         self.kinds = tuple(kinds)
-        self._pack = struct.Struct(
-            "@" + "".join("q" if not is_number(kind) else letters(kind) for kind in kinds)
-        ).pack
+        self._pack = struct.Struct("@" + "".join("q" if not is_number(kind) else letters(kind) for kind in kinds)).pack
         self.address = where
         self.answer = answer
         self._function = ctypes.CFUNCTYPE(ctypes.c_int32, ctypes.c_char_p, ctypes.c_void_p)(where)

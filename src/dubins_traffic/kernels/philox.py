@@ -36,8 +36,7 @@ def philox4x32(c0: Any, c1: Any, c2: Any, c3: Any, k0: Any, k1: Any) -> tuple[An
 
 
 _PLAIN: dict[str, Any] = {
-    name: int(word)
-    for name, word in (("M0", M0), ("M1", M1), ("W0", W0), ("W1", W1), ("LOW", LOW), ("HALF", HALF))
+    name: int(word) for name, word in (("M0", M0), ("M1", M1), ("W0", W0), ("W1", W1), ("LOW", LOW), ("HALF", HALF))
 }
 _plain_philox = FunctionType(philox4x32.__code__, _PLAIN | {"range": range})
 """The same function on plain integers, in a fifth of the time that NumPy's take where nothing is compiled."""
@@ -73,9 +72,7 @@ class Draws:
 
     def __init__(self, seed: int, trial: int, stream: int) -> None:
         if not 0 <= seed < SEEDS:
-            raise InputError(
-                "not a seed", field="seed", value=seed, expected=f"an integer >= 0 and < {SEEDS}"
-            )
+            raise InputError("not a seed", field="seed", value=seed, expected=f"an integer >= 0 and < {SEEDS}")
         self.seed, self.trial, self.stream = seed, int(trial), int(stream)
         self.drawn = 0
         self._block: tuple[int, int, int, int] = (0, 0, 0, 0)

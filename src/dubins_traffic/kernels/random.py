@@ -59,9 +59,7 @@ def block(seed: Any, trial: Any, car: Any, tick: Any, draw: Any) -> tuple[Any, A
     trial, car, tick, draw : uint64
         The counter: trial and car by their numbers, the tick, and which of the numbers drawn in it; each below 2**32.
     """
-    return philox4x32(
-        np.uint64(trial), np.uint64(car), np.uint64(tick), np.uint64(draw), seed & LOW, seed >> HALF
-    )
+    return philox4x32(np.uint64(trial), np.uint64(car), np.uint64(tick), np.uint64(draw), seed & LOW, seed >> HALF)
 
 
 @jit

@@ -265,13 +265,13 @@ def table(kind: type[R], shape: int | tuple[int, ...]) -> Any:
 
 def stack(tables: Sequence[Rows[R]]) -> Any:
     """Return a table of which each row of the first axis is one of some tables of equal lengths."""
-    rows: Any = np.stack([cast(Any, own) for own in tables])
+    rows: Any = np.stack([cast(Any, table) for table in tables])
     return rows.view(type(tables[0]))
 
 
 def join(tables: Sequence[Rows[R]]) -> Rows[R]:
     """Return a table of the rows of some tables, one after another."""
-    rows: Any = np.concatenate([cast(Any, own) for own in tables])
+    rows: Any = np.concatenate([cast(Any, table) for table in tables])
     return rows.view(type(tables[0]))
 
 
@@ -292,10 +292,10 @@ def columns(size: int) -> Callable[[type[R]], type[R]]:
 
         def at(rows: Any, far: int) -> Any:
             block = np.ndarray((), layout, rows, far)
-            own = row()
+            block_row = row()
             for name in names:
-                setattr(own, name, block[name])
-            return own
+                setattr(block_row, name, block[name])
+            return block_row
 
         row: Any = type(
             kind.__name__,

@@ -65,9 +65,7 @@ def key_of(file: Path, name: str, kinds: Sequence[Kind]) -> str:
     kinds : sequence of Kind
         Those of its arguments.
     """
-    module = (
-        ".".join(file.relative_to(PACKAGE).with_suffix("").parts) if PACKAGE in file.parents else file.stem
-    )
+    module = ".".join(file.relative_to(PACKAGE).with_suffix("").parts) if PACKAGE in file.parents else file.stem
     digest = hashlib.sha256(repr(tuple(kinds)).encode()).hexdigest()[:24]
     return f"{module}-{source_hash(file)}/{name}-{digest}"
 

@@ -38,55 +38,55 @@ class Stream:
     """The fourth."""
 
 
-def set_stream(own: Stream, draws: Draws) -> None:
+def set_stream(stream: Stream, draws: Draws) -> None:
     """Let a stream be that of some draws, where these stand; they are to `go_to` where a kernel has left it."""
-    own.seed, own.trial, own.purpose, own.drawn = (
+    stream.seed, stream.trial, stream.purpose, stream.drawn = (
         np.uint64(draws.seed),
         draws.trial,
         draws.stream,
         draws.drawn,
     )
-    own.first, own.second, own.third, own.fourth = (np.uint64(word) for word in draws.block)
+    stream.first, stream.second, stream.third, stream.fourth = (np.uint64(word) for word in draws.block)
 
 
 @jit
-def next_word(own: Stream) -> np.uint64:
+def next_word(stream: Stream) -> np.uint64:
     """Return the next 32 random bits."""
-    place = own.drawn & 3
+    place = stream.drawn & 3
     if place == 0:
-        words = block(own.seed, own.trial, LOW, own.drawn >> 2, own.purpose)
-        own.first = words[0]
-        own.second = words[1]
-        own.third = words[2]
-        own.fourth = words[3]
-    own.drawn += 1
+        words = block(stream.seed, stream.trial, LOW, stream.drawn >> 2, stream.purpose)
+        stream.first = words[0]
+        stream.second = words[1]
+        stream.third = words[2]
+        stream.fourth = words[3]
+    stream.drawn += 1
     if place == 0:
-        return own.first
+        return stream.first
     if place == 1:
-        return own.second
-    return own.third if place == 2 else own.fourth
+        return stream.second
+    return stream.third if place == 2 else stream.fourth
 
 
 @jit
-def next_uniform(own: Stream) -> float:
+def next_uniform(stream: Stream) -> float:
     """Return the next float in [0, 1), on a grid of 2**-53."""
-    high = next_word(own)
-    low = next_word(own)
+    high = next_word(stream)
+    low = next_word(stream)
     return np.float64((high << UP) | (low >> DOWN)) * GRID
 
 
 @jit
-def next_below(own: Stream, bound: int) -> int:
+def next_below(stream: Stream, bound: int) -> int:
     """Return the next integer in [0, bound), `bound` (number) at most 2**32, every one equally likely."""
     limit = (1 << 32) - (1 << 32) % bound
-    word = np.int64(next_word(own))
+    word = np.int64(next_word(stream))
     while word >= limit:
-        word = np.int64(next_word(own))
+        word = np.int64(next_word(stream))
     return int(word % bound)
 
 
 @jit
-def shuffle(own: Stream, order: Ints, count: int) -> None:
+def shuffle(stream: Stream, order: Ints, count: int) -> None:
     """Write the integers 0..count-1 in random order, `count` (number) of them.
 
     `order` (K,) is set at its first `count` places; at others it may be anything.
@@ -94,7 +94,7 @@ def shuffle(own: Stream, order: Ints, count: int) -> None:
     for k in range(count):
         order[k] = k
     for k in range(count):
-        pick = k + next_below(own, count - k)
+        pick = k + next_below(stream, count - k)
         held = order[pick]
         order[pick] = order[k]
         order[k] = held

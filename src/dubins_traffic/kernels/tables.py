@@ -36,9 +36,9 @@ class Tables:
     """Names of the arrays, in order."""
 
     def __init_subclass__(cls) -> None:
-        own = tuple(name for name in vars(cls).get("__annotations__", {}) if name.islower())
+        names = tuple(name for name in vars(cls).get("__annotations__", {}) if name.islower())
         known = dict.fromkeys(name for base in cls.__bases__ for name in getattr(base, "field_names", ()))
-        cls.field_names = (*known, *own)
+        cls.field_names = (*known, *names)
 
     def __init__(self, *values: Any, **named: Any) -> None:
         fields = self.field_names

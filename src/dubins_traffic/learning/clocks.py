@@ -48,10 +48,10 @@ def clocks(problems: Sequence[Problem]) -> Rows[Clock]:
     rows = table(Clock, len(problems))
     rules = [RuleParameters.from_mapping(problem.rules) for problem in problems]
     rates = np.array([problem.rate for problem in problems])
-    rows["still"] = [own.still_speed for own in rules]
+    rows["still"] = [rule.still_speed for rule in rules]
     rows["long"] = LONG * rates
-    rows["forfeit"] = np.array([own.forfeit_time for own in rules]) * rates
-    rows["back"] = np.array([own.left_time for own in rules]) * rates
+    rows["forfeit"] = np.array([rule.forfeit_time for rule in rules]) * rates
+    rows["back"] = np.array([rule.left_time for rule in rules]) * rates
     return rows
 
 

@@ -107,7 +107,7 @@ class Layout:
             ("goal", _GOAL),
             ("clocks", _CLOCKS),
         )
-        names = [f"{part}.{name}" for part, own in fixed for name in own]
+        names = [f"{part}.{name}" for part, parts in fixed for name in parts]
         names += [f"obstacles[{k}].{name}" for k in range(SIZE.OBSTACLES) for name in _OBSTACLE]
         names += [f"cars[{k}].{name}" for k in range(self.cars) for name in _CAR]
         return (*names, *(f"laser[{k}]" for k in range(self.rays)))

@@ -76,7 +76,7 @@ class OnnxPolicy:
             self._session = _session(content)
             self._input, self._kind, self._shape = _taken(self._session)
             self.inputs = self._shape[-1]
-            said = {str(own.key): str(own.value) for own in model.metadata_props}
+            said = {str(metadata_prop.key): str(metadata_prop.value) for metadata_prop in model.metadata_props}
             self.cars, self.frame_skip = _whole(said, "cars", 0, SHOWN), _whole(said, "frame_skip", 1, 1)
             self.names = _names(said)
             self._choices = _choices(said)
@@ -144,12 +144,12 @@ def _read(path: Path) -> tuple[Any, bytes]:
         model: Any = onnx.load_model_from_string(content)
     except DecodeError as error:
         raise InputError(f"can't be read: {_line(error)}", expected="a model of ONNX") from None
-    own = {(str(function.domain), str(function.name)) for function in model.functions}
+    local = {(str(function.domain), str(function.name)) for function in model.functions}
     for part in _parts(model):
         kind: str = part.DESCRIPTOR.name
         if kind == "TensorProto" and part.data_location == part.EXTERNAL:
             raise InputError("keeps data in another file", field=str(part.name), expected="all in this file")
-        if kind == "NodeProto" and part.domain not in _STANDARD and (part.domain, part.op_type) not in own:
+        if kind == "NodeProto" and part.domain not in _STANDARD and (part.domain, part.op_type) not in local:
             name = f"{part.domain}.{part.op_type}"
             raise InputError("not an operator of ONNX", field="node", value=name, expected="its operators")
     return model, content
@@ -159,9 +159,9 @@ def _parts(message: Any) -> Iterator[Any]:
     """Yield all messages within a message of protobuf, of whatever kind and depth, itself first."""
     left = [message]
     while left:
-        own = left.pop()
-        yield own
-        for field, value in own.ListFields():
+        taken = left.pop()
+        yield taken
+        for field, value in taken.ListFields():
             if field.message_type is not None:
                 left += [value] if hasattr(value, "ListFields") else value
 
@@ -176,29 +176,22 @@ def _session(content: bytes) -> Any:
     try:
         return runtime.InferenceSession(content, options, providers=["CPUExecutionProvider"])
     except Exception as error:
-        raise InputError(
-            f"can't be run: {_line(error)}", field="model", expected="what ONNX Runtime runs"
-        ) from None
+        raise InputError(f"can't be run: {_line(error)}", field="model", expected="what ONNX Runtime runs") from None
 
 
 def _taken(session: Any) -> tuple[str, Any, tuple[int, ...]]:
     """Return name, type and shape of what a model takes: the flat observation, alone or as a batch of one."""
     taken: list[Any] = session.get_inputs()
     if len(taken) != 1:
-        names = [str(own.name) for own in taken]
+        names = [str(node.name) for node in taken]
         raise InputError("does not fit", field="inputs", value=names, expected="one, the flat observation")
-    own = taken[0]
-    shape = [side if isinstance(side, int) else 1 for side in own.shape]
-    sized = bool(own.shape) and isinstance(own.shape[-1], int)
-    if (
-        own.type not in _KINDS
-        or not sized
-        or len(shape) > 2
-        or shape[0] != (1 if len(shape) == 2 else shape[0])
-    ):
+    number = taken[0]
+    shape = [side if isinstance(side, int) else 1 for side in number.shape]
+    sized = bool(number.shape) and isinstance(number.shape[-1], int)
+    if number.type not in _KINDS or not sized or len(shape) > 2 or shape[0] != (1 if len(shape) == 2 else shape[0]):
         expected = "float32, (F,) or (1, F)"
-        raise InputError("does not fit", field=own.name, value=f"{own.type} {own.shape}", expected=expected)
-    return str(own.name), _KINDS[own.type], tuple(shape)
+        raise InputError("does not fit", field=number.name, value=f"{number.type} {number.shape}", expected=expected)
+    return str(number.name), _KINDS[number.type], tuple(shape)
 
 
 def _whole(said: dict[str, str], name: str, least: int, usual: int) -> int:
@@ -211,7 +204,7 @@ def _whole(said: dict[str, str], name: str, least: int, usual: int) -> int:
 
 def _names(said: dict[str, str]) -> tuple[str, ...]:
     names = _listed(said, "names", "[]")
-    if not all(isinstance(own, str) for own in names):
+    if not all(isinstance(name, str) for name in names):
         raise InputError("not names", field="names", value=said["names"], expected="a JSON list of names")
     return tuple(names)
 

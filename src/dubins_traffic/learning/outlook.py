@@ -181,12 +181,12 @@ def new_outlook(
     state, labels, cars, obstacles = around
     trial = table(Outlook, len(problems))
     trial["net"] = nets
-    trial["radius"] = [own.intersection_radius for own in problems]
-    trial["sight"] = [own.sensing_radius for own in problems]
-    trial["sight2"] = [own.sensing_radius * own.sensing_radius for own in problems]
-    trial["half_width"] = [own.car.lane_width for own in problems]
-    trial["speed"] = [own.car.bounds.speed for own in problems]
-    trial["yaw_rate"] = [own.car.bounds.yaw_rate for own in problems]
+    trial["radius"] = [problem.intersection_radius for problem in problems]
+    trial["sight"] = [problem.sensing_radius for problem in problems]
+    trial["sight2"] = [problem.sensing_radius * problem.sensing_radius for problem in problems]
+    trial["half_width"] = [problem.car.lane_width for problem in problems]
+    trial["speed"] = [problem.car.bounds.speed for problem in problems]
+    trial["yaw_rate"] = [problem.car.bounds.yaw_rate for problem in problems]
     goal, metres = _goals(problems, trial)
     laser, rays = _laser(problems[0])
     return OutlookTables(
@@ -237,7 +237,7 @@ def _laser(problem: Problem) -> tuple[Rows[Sweeps], Rows[Ray]]:
     sweeps, laser = table(Sweeps, 1), problem.laser
     if laser is None:
         return sweeps, table(Ray, 0)
-    own = sweeps[0]
-    own.rate, own.control = laser.rate, problem.rate
-    own.shortest, own.longest = laser.range_min, laser.range_max
+    sweep = sweeps[0]
+    sweep.rate, sweep.control = laser.rate, problem.rate
+    sweep.shortest, sweep.longest = laser.range_min, laser.range_max
     return sweeps, rays_at(np.linspace(laser.angle_min, laser.angle_max, laser.rays))

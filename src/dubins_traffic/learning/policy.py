@@ -204,9 +204,7 @@ class Learned:
         names = self._policy.names or tuple(places)
         missing = [name for name in names if name not in places]
         if missing:
-            raise InputError(
-                "not in the observation", field="names", value=missing[0], expected="a name of Layout"
-            )
+            raise InputError("not in the observation", field="names", value=missing[0], expected="a name of Layout")
         if self._policy.inputs != len(names):
             expected = f"{len(names)} numbers, those of {len(self._policy.names) or 'all'} names of Layout"
             raise InputError("does not fit", field="input", value=self._policy.inputs, expected=expected)

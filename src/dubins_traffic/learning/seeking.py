@@ -48,16 +48,16 @@ def metres_to_goal(b: int, n: int, row: int, tables: OutlookTables) -> float:
 @jit
 def _out_of_disc(b: int, at: int, x: float, y: float, row: int, tables: OutlookTables) -> float:
     """Return the metres from (x, y) in the disc of `at` to a goal: straight to where a road leaves, and along it."""
-    roads, goal, own = tables.roads, tables.goal[row], tables.trial[b]
-    vertex: int = roads.vert_off[own.net] + at
+    roads, goal, trial = tables.roads, tables.goal[row], tables.trial[b]
+    vertex: int = roads.vert_off[trial.net] + at
     if goal.vertex == at and goal.fresh != 0:
         dx, dy = x - roads.vertex[vertex].x, y - roads.vertex[vertex].y
         return sqrt(dx * dx + dy * dy)
     least = INFINITE
     for k in range(roads.degree[vertex]):
         lane: int = roads.arms[vertex, k]
-        ax, ay, tx, ty, length = frame(roads, own.net, lane)
-        out = min(own.radius, 0.5 * length)
+        ax, ay, tx, ty, length = frame(roads, trial.net, lane)
+        out = min(trial.radius, 0.5 * length)
         dx, dy = ax + out * tx - x, ay + out * ty - y
         least = min(least, sqrt(dx * dx + dy * dy) + tables.metres[goal.route, lane] - out)
     return least
@@ -102,15 +102,15 @@ def seek(b: int, tables: OutlookTables) -> int:
 
     If it has visited the goal that it seeks, or seeks none, it seeks the nearest goal of its round from here on.
     """
-    own = tables.trial[b]
+    trial = tables.trial[b]
     at: int = tables.labels.at[b, EGO]
-    if at == own.last_at and own.target >= 0:
+    if at == trial.last_at and trial.target >= 0:
         return 0
     visited = 0
-    if at >= 0 and at != own.last_at:
+    if at >= 0 and at != trial.last_at:
         visited = _come_into(b, at, tables)
-        own.last_at = at
-    if own.target < 0 or tables.done[own.target] != 0 or visited != 0:
+        trial.last_at = at
+    if trial.target < 0 or tables.done[trial.target] != 0 or visited != 0:
         _choose(b, tables)
     return visited
 
@@ -118,29 +118,29 @@ def seek(b: int, tables: OutlookTables) -> int:
 @jit
 def _come_into(b: int, at: int, tables: OutlookTables) -> int:
     """Note that the ego has come into the disc of `at`; return the number of goals that it visits thereby."""
-    own = tables.trial[b]
+    trial = tables.trial[b]
     visited = 0
-    for row in range(own.first_goal, own.last_goal):
+    for row in range(trial.first_goal, trial.last_goal):
         goal = tables.goal[row]
         come_by(at, goal)
         if begins_visit(goal.vertex == at, goal):
             visited += 1
-            do_goal(row, tables.done, own)
-    own.visits += visited
+            do_goal(row, tables.done, trial)
+    trial.visits += visited
     if visited != 0:
-        finish_round(own.first_goal, own.last_goal, tables.done, own)
+        finish_round(trial.first_goal, trial.last_goal, tables.done, trial)
     return visited
 
 
 @jit
 def _choose(b: int, tables: OutlookTables) -> None:
     """Let the ego seek the goal of its round that is nearest along lanes, the first of equally near ones."""
-    own = tables.trial[b]
-    own.target = -1
+    trial = tables.trial[b]
+    trial.target = -1
     least = INFINITE
-    for row in range(own.first_goal, own.last_goal):
+    for row in range(trial.first_goal, trial.last_goal):
         if tables.done[row] == 0:
             metres = metres_to_goal(b, EGO, row, tables)
-            if own.target < 0 or metres < least:
-                own.target = row
+            if trial.target < 0 or metres < least:
+                trial.target = row
                 least = metres

@@ -121,9 +121,7 @@ class Access:
 
     def _has_cookie(self, headers: Headers) -> bool:
         # Those of other programs at this address come along, in whatever form, so only names and values are told apart.
-        given = [
-            part.strip().partition("=") for line in headers.get_all("Cookie") for part in line.split(";")
-        ]
+        given = [part.strip().partition("=") for line in headers.get_all("Cookie") for part in line.split(";")]
         return any(name == self._name and _equal(value, self._key) for name, _, value in given)
 
 

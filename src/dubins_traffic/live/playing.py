@@ -69,12 +69,10 @@ def play(
     )
     feed.end(instance, result.ending, summarise(result.score), result.score.verdict)
     names = ", ".join(RIVALS[:-1])
-    feed.tell(
-        {"kind": "places", "rows": [], "sentence": f"{names} and {RIVALS[-1]} are driving the same trial ..."}
-    )
+    feed.tell({"kind": "places", "rows": [], "sentence": f"{names} and {RIVALS[-1]} are driving the same trial ..."})
     scores = [result.score, *(run_trial(instance, name, sketch=False).score for name in RIVALS)]
     found = standings(scores)
-    feed.tell({"kind": "places", "rows": [_row(own) for own in found], "sentence": sentence(found)})
+    feed.tell({"kind": "places", "rows": [_row(standing) for standing in found], "sentence": sentence(found)})
     return result, found
 
 
@@ -87,20 +85,20 @@ def standings(scores: Sequence[Score]) -> list[Standing]:
     ]
 
 
-def sentence(found: Sequence[Standing]) -> str:
+def sentence(standings: Sequence[Standing]) -> str:
     """Return in a sentence which place the person has."""
-    own = next(standing for standing in found if standing.score.controller == NAME)
-    equal = [str(other.score.controller) for other in found if other.place == own.place and other is not own]
+    ours = next(standing for standing in standings if standing.score.controller == NAME)
+    equal = [str(other.score.controller) for other in standings if other.place == ours.place and other is not ours]
     shared = f", level with {' and '.join(equal)}" if equal else ""
-    return f"You came {PLACES[own.place - 1]} of four{shared}."
+    return f"You came {PLACES[ours.place - 1]} of four{shared}."
 
 
-def _row(own: Standing) -> dict[str, object]:
-    score = own.score
+def _row(standing: Standing) -> dict[str, object]:
+    score = standing.score
     is_person = score.controller == NAME
     cells = [
         "you" if is_person else str(score.controller),
-        str(own.place),
+        str(standing.place),
         str(score.counted_rounds),
         f"{score.rounds_before_breach:.2f}",
         score.outcome.replace("_", " "),

@@ -60,9 +60,7 @@ def _as_it_grows(source: str, record: Record) -> Iterator[Record]:
             yield record
 
 
-def _frames(
-    frames: Frames, begin: int, state: State, labels: Labels
-) -> Iterator[tuple[int, Sequence[Contact]]]:
+def _frames(frames: Frames, begin: int, state: State, labels: Labels) -> Iterator[tuple[int, Sequence[Contact]]]:
     """Write the frames from `begin` on into `state` and `labels` (1, N), and yield the tick and contacts of each."""
     states, labelled = frames.states
     contacts: dict[int, list[Contact]] = {}

@@ -131,9 +131,7 @@ class Server:
 
     def _answer(self, _connection: ServerConnection, request: Request) -> Response | None:
         """Answer a request with the page; None lets it open the socket."""
-        if (
-            getattr(request, "method", "GET") != "GET"
-        ):  # earlier versions of websockets let nothing else through
+        if getattr(request, "method", "GET") != "GET":  # earlier versions of websockets let nothing else through
             return _response(405, "the page is there to be read", "text/plain", {"Allow": "GET"})
         try:
             door = self._access.admit(request.path, request.headers)
@@ -154,9 +152,7 @@ class Server:
         scripts = [part(f"live/{name}") for name in SCRIPTS]
         plays = self._wheel is not None
         style = part("live/live.css")
-        return page_of(
-            show.document, template="live/live.html", style=style, scripts=scripts, host=host, plays=plays
-        )
+        return page_of(show.document, template="live/live.html", style=style, scripts=scripts, host=host, plays=plays)
 
     async def _hold(self, connection: ServerConnection) -> None:
         """Serve one page until it goes, or has been sent everything."""

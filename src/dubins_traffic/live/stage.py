@@ -59,9 +59,7 @@ class Stage:
         plays: bool = False,
     ) -> None:
         if not 0.0 < pace <= MOST_PACE:
-            raise InputError(
-                "not a pace", file="--pace", value=pace, expected=f"a number > 0, at most {MOST_PACE:g}"
-            )
+            raise InputError("not a pace", file="--pace", value=pace, expected=f"a number > 0, at most {MOST_PACE:g}")
         self._browser = _browser() if opens else None
         self._tell = tell
         opened = listen(HOSTS[0], port)

@@ -24,16 +24,16 @@ FREE: Final = Turn("free", "")
 """Nothing: there is no crossing near."""
 
 
-def turn_of(own: Propositions, here: Situation) -> Turn:
+def turn_of(propositions: Propositions, here: Situation) -> Turn:
     """Return whose turn it is (docs/rules.md#queue), as far as the ego can see."""
     if here.stop_line <= 0.0 or not here.crossing or here.stop_line > NEAR:
         return FREE
-    if not own.stopped:
+    if not propositions.stopped:
         return Turn("stop", "Stop at the line before the crossing")
-    if own.ahead:
+    if propositions.ahead:
         names = ", ".join(car.name for car in here.before) or "another car"
         return Turn("wait", f"Wait: {names} before you")
-    if not own.clear:
+    if not propositions.clear:
         names = ", ".join(car.name for car in here.inside) or "another car"
         return Turn("wait", f"Wait: {names} in the crossing")
     return Turn("go", "Your turn: go")

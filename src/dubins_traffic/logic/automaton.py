@@ -145,9 +145,7 @@ class Stepper:
                 return self.step(node.parts[0], letter)
             rest = self.table.node(node._replace(running=2 if node.running else 1))
         else:
-            rest = (
-                node.parts[0] if node.length == 1 else self.table.node(node._replace(length=node.length - 1))
-            )
+            rest = node.parts[0] if node.length == 1 else self.table.node(node._replace(length=node.length - 1))
         return frozenset([frozenset([rest << 2 | (STRONG if node.strong else 0)])])
 
     def _step_fixpoint(self, node: Node, number: int, letter: Letter) -> Moves:
@@ -158,9 +156,7 @@ class Stepper:
                 return right
             rest = self.table.node(node._replace(running=2 if node.running else 1))
         elif node.length > 0:
-            rest = (
-                node.parts[1] if node.length == 1 else self.table.node(node._replace(length=node.length - 1))
-            )
+            rest = node.parts[1] if node.length == 1 else self.table.node(node._replace(length=node.length - 1))
         else:
             rest = number
             flags |= PUT_OFF if node.kind == "until" else 0
@@ -454,12 +450,12 @@ class _Builder:
             node = nodes[atom >> 2]
             if node.clock >= 0 and node.running:
                 ages.setdefault(node.clock, set()).add(node.running)
-        if any(len(found) > 1 for found in ages.values()):
+        if any(len(age) > 1 for age in ages.values()):
             raise FormulaError(
                 "a bounded operator can be asked for again while it is pending, in a way that one clock can't follow",
                 expected="shorter bounds, bounds from 0, or fewer operators inside each other",
             )
-        reset = sum(1 << clock for clock, found in ages.items() if found == {1})
+        reset = sum(1 << clock for clock, age in ages.items() if age == {1})
         changed = self._stepper.smallest(
             self._stepper.conjunction(frozenset(self._running(atom) for atom in move)) for move in moves
         )
@@ -547,9 +543,7 @@ def _reduced(table: Table, letter: Ints, target: Ints, reset: Ints, verdict: Int
     block = verdict - verdict.min()
     count = 0
     while True:
-        rows = np.concatenate(
-            [block[:, None], block[target].reshape(states, -1), reset.reshape(states, -1)], axis=1
-        )
+        rows = np.concatenate([block[:, None], block[target].reshape(states, -1), reset.reshape(states, -1)], axis=1)
         _, first, block = np.unique(rows, axis=0, return_index=True, return_inverse=True)
         block = block.reshape(-1)
         if len(first) == count:

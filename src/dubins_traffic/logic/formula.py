@@ -62,9 +62,7 @@ class FormulaError(InputError):
         As in `InputError`.
     """
 
-    def __init__(
-        self, problem: str, *, line: int | None = None, column: int | None = None, **context: Any
-    ) -> None:
+    def __init__(self, problem: str, *, line: int | None = None, column: int | None = None, **context: Any) -> None:
         self.line = line
         self.column = column
         self.context = context

@@ -101,23 +101,21 @@ def delay(values: Ints, lines: Lines, memory: Grid[Requests], rings: Ints) -> No
             for i in range(first, lines.names_off[d + 1]):
                 valuation |= (values[b, lines.names[i]] & 1) << (i - first)
             letter = lines.letter[lines.letter_at[d] + valuation]
-            own = memory[b, d]
-            cell = own.state * lines.letters[d] + letter + lines.cell_at[d]
-            own.state = int(lines.target[cell])
-            place = lines.ring_off[d] + own.place
+            register = memory[b, d]
+            cell = register.state * lines.letters[d] + letter + lines.cell_at[d]
+            register.state = int(lines.target[cell])
+            place = lines.ring_off[d] + register.place
             out = rings[b, place]
             rings[b, place] = lines.value[cell]
-            own.waiting += lines.value[cell] - out
-            own.place += 1
+            register.waiting += lines.value[cell] - out
+            register.place += 1
             if place + 1 == lines.ring_off[d + 1]:
-                own.place = 0
+                register.place = 0
             values[b, values.shape[1] - count + d] = out
 
 
 @jit
-def advance(
-    values: Ints, tables: Tables, memory: Grid[Requests], state: Ints, clocks: Ints, verdicts: Ints
-) -> None:
+def advance(values: Ints, tables: Tables, memory: Grid[Requests], state: Ints, clocks: Ints, verdicts: Ints) -> None:
     """Take one frame of every trial into account.
 
     Parameters
@@ -144,19 +142,19 @@ def advance(
             for i in range(first, tables.names_off[m + 1]):
                 valuation |= (values[b, tables.names[i]] & 1) << (i - first)
             count = tables.clock_count[m]
-            own = tables.clock_off[m]
+            clock_off = tables.clock_off[m]
             expired = 0
             for c in range(count):
-                if clocks[b, own + c] == 0:
+                if clocks[b, clock_off + c] == 0:
                     expired |= 1 << c
             letter = tables.letter[tables.letter_at[m] + valuation]
             cell = ((state[b, m] * tables.letters[m] + letter) << count) + expired + tables.cell_at[m]
             reset = tables.reset[cell]
             for c in range(count):
                 if (reset >> c) & 1:
-                    clocks[b, own + c] = tables.clock_length[own + c] - 1
-                elif clocks[b, own + c] > 0:
-                    clocks[b, own + c] -= 1
+                    clocks[b, clock_off + c] = tables.clock_length[clock_off + c] - 1
+                elif clocks[b, clock_off + c] > 0:
+                    clocks[b, clock_off + c] -= 1
             target = tables.target[cell]
             state[b, m] = target
             verdict = tables.verdict[tables.verdict_at[m] + target]

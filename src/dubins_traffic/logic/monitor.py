@@ -171,9 +171,7 @@ def _split(formula: Formula, positive: bool) -> list[Formula]:
         return _split(formula.args[0], True) + _split(formula.args[1], False)
     if formula.op is Op.IMPLIES:
         conclusions = _split(formula.args[1], True)
-        return (
-            [formula] if len(conclusions) == 1 else [implies(formula.args[0], part) for part in conclusions]
-        )
+        return [formula] if len(conclusions) == 1 else [implies(formula.args[0], part) for part in conclusions]
     if formula.op in (Op.G, Op.F) and (formula.op is Op.G) == positive:
         return [always(part, formula.bounds) for part in _split(formula.args[0], positive)]
     return [formula if positive else ~formula]
@@ -185,11 +183,11 @@ def groups(split: Sequence[Formula]) -> list[list[Formula]]:
     for part in split:
         names, members = set(propositions(part)), [part]
         apart: list[tuple[set[str], list[Formula]]] = []
-        for other, own in found:
+        for other, others in found:
             if names & other:
-                names, members = names | other, own + members
+                names, members = names | other, others + members
             else:
-                apart.append((other, own))
+                apart.append((other, others))
         found = [*apart, (names, members)]
     return [members for _, members in found]
 
@@ -367,13 +365,9 @@ class Monitors:
         """Add a table; `request` is its proposition that comes out of the last delay line."""
         for name in table.names:
             if name != request and name not in self._column:
-                raise FormulaError(
-                    "unknown proposition", value=name, expected="one of the problem's propositions"
-                )
+                raise FormulaError("unknown proposition", value=name, expected="one of the problem's propositions")
         last = len(self._delays) - 1
-        columns = tuple(
-            len(self._column) + last if name == request else self._column[name] for name in table.names
-        )
+        columns = tuple(len(self._column) + last if name == request else self._column[name] for name in table.names)
         self._pieces.append(Piece(number, table, columns, last if strong else -1))
 
     def reset(self, trials: int) -> None:

@@ -68,9 +68,7 @@ def timed_parts(formula: Formula) -> frozenset[Formula]:
     return frozenset(timed)
 
 
-def letters_of(
-    names: Sequence[str], tests: Sequence[Formula]
-) -> tuple[npt.NDArray[np.int64], list[tuple[bool, ...]]]:
+def letters_of(names: Sequence[str], tests: Sequence[Formula]) -> tuple[npt.NDArray[np.int64], list[tuple[bool, ...]]]:
     """Return the letter of each valuation of the propositions `names`, and the outcomes of `tests` for each letter.
 
     Bit number i of a valuation is the value of proposition number i.
@@ -225,11 +223,7 @@ class Table:
         other = {"true": "false", "and": "or", "until": "release"}
         other |= {value: key for key, value in other.items()}
         parts = tuple(self.dual(part) for part in node.parts)
-        strong = (
-            node.strong
-            if node.kind in ("and", "or", "until", "release", "true", "false")
-            else not node.strong
-        )
+        strong = node.strong if node.kind in ("and", "or", "until", "release", "true", "false") else not node.strong
         changed = node._replace(kind=other.get(node.kind, node.kind), parts=parts, strong=strong)
         if node.kind in ("and", "or"):
             changed = changed._replace(parts=tuple(sorted(parts)))
@@ -254,9 +248,7 @@ class Table:
         if op in PAST:
             return self.node(Node("past", first=self._past(formula), strong=positive))
         if op is Op.IMPLIES:
-            return self._join(
-                not positive, [self._build(args[0], not positive), self._build(args[1], positive)]
-            )
+            return self._join(not positive, [self._build(args[0], not positive), self._build(args[1], positive)])
         if op is Op.IFF:
             a, b = args
             return self._join(

@@ -69,9 +69,7 @@ _SPELLINGS: Final = {
 }
 _CONSTANTS: Final = {"true": TRUE, "1": TRUE, "false": FALSE, "0": FALSE}
 _UNARY: Final = {op.value: op for op in (Op.NOT, Op.X, Op.F, Op.G, Op.Y, Op.Z, Op.O, Op.H)}
-_RANKS: Final = {Op.IFF: 1, Op.IMPLIES: 2, Op.OR: 3, Op.AND: 4} | dict.fromkeys(
-    (Op.U, Op.R, Op.W, Op.M, Op.S, Op.T), 5
-)
+_RANKS: Final = {Op.IFF: 1, Op.IMPLIES: 2, Op.OR: 3, Op.AND: 4} | dict.fromkeys((Op.U, Op.R, Op.W, Op.M, Op.S, Op.T), 5)
 _BINARY: Final = {op.value: op for op in _RANKS}
 _TIGHTEST: Final = 6
 _OPERAND: Final = "a proposition, true, false, '(' or a unary operator"
@@ -112,9 +110,7 @@ def parse(text: str, *, file: str | None = None) -> Formula:
         it is too long or nested too deeply.
     """
     if len(text) > MAX_LENGTH:
-        raise FormulaError(
-            "too long", line=1, column=1, file=file, expected=f"at most {MAX_LENGTH} characters"
-        )
+        raise FormulaError("too long", line=1, column=1, file=file, expected=f"at most {MAX_LENGTH} characters")
     return _Parser(text, file).whole()
 
 
@@ -199,9 +195,7 @@ class _Parser:
             self._unexpected(self._wanted())
         self._take()
         rank = _RANKS[op]
-        while self._pending and (
-            self._pending[-1].rank > rank or (self._pending[-1].rank == rank and op is Op.IFF)
-        ):
+        while self._pending and (self._pending[-1].rank > rank or (self._pending[-1].rank == rank and op is Op.IFF)):
             self._reduce()
         self._pending.append(_Pending(token, op, rank, self._bounds(op)))
 

@@ -175,12 +175,7 @@ def _simple_unary(part: Formula) -> Formula:
         return part if kept else arg
     if part.bounds == (0.0, 0.0):
         return arg
-    if (
-        part.op in (Op.F, Op.G, Op.O, Op.H)
-        and arg.op is part.op
-        and part.bounds is None
-        and arg.bounds is None
-    ):
+    if part.op in (Op.F, Op.G, Op.O, Op.H) and arg.op is part.op and part.bounds is None and arg.bounds is None:
         return arg
     return part
 

@@ -84,16 +84,18 @@ class Drafter:
 
     def _contract(self, draft: Draft) -> Drops:
         """Draw the ends of strands that are too short together; return those with which that can't be done."""
-        found = Contraction(draft.strands, draft.junctions, 2.0 * self._limits.straight)
-        draft.strands = found.strands
-        return dict.fromkeys(found.stuck, Reason.LENGTH)
+        contraction = Contraction(draft.strands, draft.junctions, 2.0 * self._limits.straight)
+        draft.strands = contraction.strands
+        return dict.fromkeys(contraction.stuck, Reason.LENGTH)
 
     def _crowded(self, draft: Draft) -> Drops:
         """Return the fifth roads of junctions, and roads at junctions that are too near each other."""
         ends = draft.ends()
         drops: Drops = {}
-        for own in ends.values():
-            spare = sorted((draft.strands[s].length, s) for s, _ in own)[: max(0, len(own) - LARGEST_DEGREE)]
+        for ends_there in ends.values():
+            spare = sorted((draft.strands[s].length, s) for s, _ in ends_there)[
+                : max(0, len(ends_there) - LARGEST_DEGREE)
+            ]
             drops |= {s: Reason.DEGREE for _, s in spare}
         if drops:
             return drops
@@ -104,7 +106,7 @@ class Drafter:
             step = places[k + 1 :] - places[k]
             for other in np.flatnonzero((step * step).sum(axis=1) < apart * apart).tolist():
                 near = ends[names[k]], ends[names[k + 1 + other]]
-                few = min(near, key=lambda own: sum(draft.strands[s].length for s, _ in own))
+                few = min(near, key=lambda pair: sum(draft.strands[s].length for s, _ in pair))
                 drops[min(few, key=lambda end: draft.strands[end[0]].length)[0]] = Reason.JUNCTIONS
         return drops
 
@@ -117,11 +119,11 @@ class Drafter:
             key = strand.line.tobytes(), aim
             if key not in self._kept:
                 self._kept[key] = fit(strand.line, self._limits, aim)
-            found = self._kept[key]
-            if found is None:
+            fitted = self._kept[key]
+            if fitted is None:
                 drops[s] = Reason.ANGLE if aims and any(aim) else Reason.CURVATURE
             else:
-                fits.append(found)
+                fits.append(fitted)
         draft.fits = fits
         return drops
 
@@ -129,13 +131,13 @@ class Drafter:
         """Return the directions of arms that must be turned, and the roads that are too near another all the same."""
         aims: dict[tuple[int, bool], tuple[float, float]] = {}
         drops: Drops = {}
-        for own in draft.ends().values():
-            bearings = [_bearing(draft, s, begins) for s, begins in own]
+        for ends in draft.ends().values():
+            bearings = [_bearing(draft, s, begins) for s, begins in ends]
             wanted = spread(bearings, self._settings.least_angle)
             if wanted is None:
-                drops[_least_of_sharpest(draft, own, bearings)] = Reason.ANGLE
+                drops[_least_of_sharpest(draft, ends, bearings)] = Reason.ANGLE
                 continue
-            for end, bearing, old in zip(own, wanted, bearings, strict=True):
+            for end, bearing, old in zip(ends, wanted, bearings, strict=True):
                 if abs(bearing - old) > 1e-9:
                     aims[end] = (cos(bearing), sin(bearing))
         return aims, drops
@@ -152,11 +154,11 @@ def _bearing(draft: Draft, s: int, begins: bool) -> float:
     return atan2(y - here[1], x - here[0])
 
 
-def _least_of_sharpest(draft: Draft, own: list[tuple[int, bool]], bearings: list[float]) -> int:
+def _least_of_sharpest(draft: Draft, ends: list[tuple[int, bool]], bearings: list[float]) -> int:
     """Return the shorter of the two strands that make the sharpest angle."""
-    pairs = [(i, j) for i in range(len(own)) for j in range(i)]
+    pairs = [(i, j) for i in range(len(ends)) for j in range(i)]
     i, j = max(pairs, key=lambda pair: cos(bearings[pair[0]] - bearings[pair[1]]))
-    return min(own[i][0], own[j][0], key=lambda s: draft.strands[s].length)
+    return min(ends[i][0], ends[j][0], key=lambda s: draft.strands[s].length)
 
 
 def conflicts(

@@ -77,8 +77,8 @@ class Trace(NamedTuple):
         away = self.away.copy()
         owner = np.where(self.owner >= end, self.owner + (len(new) - (end - begin)), self.owner)
         if len(touched):
-            away[touched], own = _measured(self.points[touched], local)
-            owner[touched] = low + own
+            away[touched], nearest = _measured(self.points[touched], local)
+            owner[touched] = low + nearest
         return Trace(self.points, parts, away, owner)
 
 
@@ -156,9 +156,7 @@ def fit(line: Floats, limits: Limits, aims: tuple[Aim, Aim] = (None, None)) -> F
     samples = dense(line, 5.0 * limits.tolerance)
     fixed = aims[0] is not None, aims[1] is not None
     best = None if any(fixed) else _fitted(line[[0, -1]], fixed, samples, length, limits)
-    heads, tails = (
-        list(_approaches(one, limits, aim)) for one, aim in zip((line, line[::-1]), aims, strict=True)
-    )
+    heads, tails = (list(_approaches(one, limits, aim)) for one, aim in zip((line, line[::-1]), aims, strict=True))
     far = length > FAR * limits.straight
     chosen = heads[0]
     for head, tail in [(head, tail) for head in heads for tail in (tails[:1] if far else tails)]:
@@ -169,9 +167,7 @@ def fit(line: Floats, limits: Limits, aims: tuple[Aim, Aim] = (None, None)) -> F
     for tail in tails[1:] if far else []:
         if best is None or best.lost > 0.0:
             made = _begun(line, chosen, tail, fixed, samples, limits)
-            best = min(
-                (each for each in (best, made) if each is not None), key=lambda each: each.cost, default=None
-            )
+            best = min((each for each in (best, made) if each is not None), key=lambda each: each.cost, default=None)
     return best
 
 
@@ -201,9 +197,7 @@ def _approaches(line: Floats, limits: Limits, aim: Aim) -> Iterator[Approach]:
         yield from ((corner, far + rejoin * straight) for rejoin in REJOINS)
 
 
-def _fitted(
-    polygon: Floats, fixed: tuple[bool, bool], samples: Floats, length: float, limits: Limits
-) -> Fit | None:
+def _fitted(polygon: Floats, fixed: tuple[bool, bool], samples: Floats, length: float, limits: Limits) -> Fit | None:
     """Return the fit of a control polygon: made feasible, then with fewer corners."""
     feasible = _feasible(polygon, fixed, samples, limits)
     if feasible is None:
@@ -342,9 +336,7 @@ class Exchange(NamedTuple):
 def _drops(polygon: Floats, fixed: tuple[bool, bool], k: int) -> list[Exchange]:
     """Return how one of the corners about corner `k` goes."""
     low, high = 1 + fixed[0], len(polygon) - 2 - fixed[1]
-    return [
-        Exchange(each, each + 1, np.empty((0, 2))) for each in range(max(k - 1, low), min(k + 1, high) + 1)
-    ]
+    return [Exchange(each, each + 1, np.empty((0, 2))) for each in range(max(k - 1, low), min(k + 1, high) + 1)]
 
 
 def _merges(polygon: Floats, fixed: tuple[bool, bool], begin: int, end: int) -> list[Exchange]:

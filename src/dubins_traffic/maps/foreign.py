@@ -91,10 +91,10 @@ def hints_text(made: RoadMap, names: Sequence[str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def with_hints(found: RoadMap, text: str, file: str | None) -> RoadMap:
+def with_hints(road_map: RoadMap, text: str, file: str | None) -> RoadMap:
     """Return a map with what the instructions before the root of its text say; InputError if they are broken."""
     root = _ROOT.search(text)
-    frame = found.frame
+    frame = road_map.frame
     corners: dict[str, str] = {}
     for kind, value in _HINT.findall(text[: root.start()] if root else ""):
         if kind == "frame":
@@ -105,12 +105,12 @@ def with_hints(found: RoadMap, text: str, file: str | None) -> RoadMap:
         else:
             raise InputError("unknown instruction", file=file, value=kind, expected="frame or corners")
     if frame is None:
-        return found
+        return road_map
     roads = [
         replace(road, corners=read_corners(corners[road.name], file)) if road.name in corners else road
-        for road in found.roads
+        for road in road_map.roads
     ]
-    return replace(found, roads=tuple(roads), frame=frame)
+    return replace(road_map, roads=tuple(roads), frame=frame)
 
 
 def turn(into: float, out: float) -> Literal["straight", "left", "right"]:

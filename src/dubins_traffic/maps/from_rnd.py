@@ -25,9 +25,7 @@ DIGITS = 12
 
 def road_map(document: Mapping[str, Any]) -> RoadMap:
     """Return the map of an RND document, in metres: junctions ``v0``, ... and roads ``s0``, ... in their order."""
-    frame = Frame(
-        float(document["length"]), *(float(entry) for entry in document.get("transform", (0, 0, 0)))
-    )
+    frame = Frame(float(document["length"]), *(float(entry) for entry in document.get("transform", (0, 0, 0))))
     rows = [[float(number) for number in row] for row in document["segments"]]
     names: dict[tuple[float, float], str] = {}
     degrees: dict[str, int] = {}
@@ -36,13 +34,9 @@ def road_map(document: Mapping[str, Any]) -> RoadMap:
         ends = [names.setdefault((row[k], row[k + 1]), f"v{len(names)}") for k in (0, 2)]
         for end in ends:
             degrees[end] = degrees.get(end, 0) + 1
-        places = _to_world(
-            np.array([row[0:2], row[2:4], *(row[k : k + 2] for k in range(4, len(row), 3))]), frame
-        )
+        places = _to_world(np.array([row[0:2], row[2:4], *(row[k : k + 2] for k in range(4, len(row), 3))]), frame)
         radii = [frame.length * radius for radius in row[6::3]]
-        corners = tuple(
-            (float(x), float(y), radius) for (x, y), radius in zip(places[2:], radii, strict=True)
-        )
+        corners = tuple((float(x), float(y), radius) for (x, y), radius in zip(places[2:], radii, strict=True))
         # Where two arcs fill the side between them, the first ends at the point at which the second begins.
         line = cleaned(rounded(places[0], corners, places[1], SAGITTA))
         roads.append(Road(f"s{s}", ends[0], ends[1], line, 1, 1, LANE_WIDTH, corners))
@@ -54,12 +48,12 @@ def road_map(document: Mapping[str, Any]) -> RoadMap:
     return RoadMap(junctions, tuple(roads), frame)
 
 
-def network_document(found: RoadMap) -> dict[str, Any] | None:
+def network_document(road_map: RoadMap) -> dict[str, Any] | None:
     """Return the RND document of a map that was a network of ours, None if it is none any more."""
-    frame = found.frame
-    if frame is None or not all(_is_ours(road, found.junctions) for road in found.roads):
+    frame = road_map.frame
+    if frame is None or not all(_is_ours(road, road_map.junctions) for road in road_map.roads):
         return None
-    rows = [_row(road, found.junctions, frame) for road in found.roads]
+    rows = [_row(road, road_map.junctions, frame) for road in road_map.roads]
     whole = all(len(row) == 4 and all(isinstance(number, int) for number in row) for row in rows)
     return {
         "version": 0 if whole else 2,
@@ -90,9 +84,7 @@ def read_corners(text: str, file: str | None) -> tuple[Corner, ...]:
     """Return the corners in a text ``x y radius x y radius ...``; InputError if they are none."""
     numbers = _numbers(text, file)
     if len(numbers) % 3 or any(not radius > 0.0 for radius in numbers[2::3]):
-        raise InputError(
-            "not corners", file=file, value=text, expected="x, y and a radius above 0 for each corner"
-        )
+        raise InputError("not corners", file=file, value=text, expected="x, y and a radius above 0 for each corner")
     return tuple((numbers[k], numbers[k + 1], numbers[k + 2]) for k in range(0, len(numbers), 3))
 
 
@@ -107,18 +99,14 @@ def _numbers(text: str, file: str | None) -> list[float]:
     except ValueError:
         numbers = [float("nan")]
     if not np.isfinite(numbers).all():
-        raise InputError(
-            "not numbers", file=file, value=text, expected="finite numbers with blanks between them"
-        )
+        raise InputError("not numbers", file=file, value=text, expected="finite numbers with blanks between them")
     return numbers
 
 
 def _row(road: Road, junctions: Mapping[str, Junction], frame: Frame) -> list[float]:
     corners = road.corners or ()
     places = [junctions[road.first][:2], junctions[road.last][:2], *((x, y) for x, y, _ in corners)]
-    lattice = [
-        [_plain(number) for number in place] for place in _to_lattice(np.array(places), frame).tolist()
-    ]
+    lattice = [[_plain(number) for number in place] for place in _to_lattice(np.array(places), frame).tolist()]
     bends = [
         number
         for place, (_, _, radius) in zip(lattice[2:], corners, strict=True)

@@ -95,9 +95,7 @@ def _place(lines: list[Floats]) -> tuple[float, float]:
     across = np.eye(2)[None] - unit[:, :, None] * unit[:, None, :]
     whole = across.sum(axis=0)
     if float(np.linalg.eigvalsh(whole)[0]) > PARALLEL * len(lines):
-        crossing = np.asarray(
-            np.linalg.solve(whole, (across @ ends[:, :, None]).sum(axis=0)[:, 0]), dtype=np.float64
-        )
+        crossing = np.asarray(np.linalg.solve(whole, (across @ ends[:, :, None]).sum(axis=0)[:, 0]), dtype=np.float64)
         reach = float(np.sqrt(((ends - mean) ** 2).sum(axis=1)).max())
         if float(np.sqrt(((crossing - mean) ** 2).sum())) <= 2.0 * reach:
             return float(crossing[0]), float(crossing[1])

@@ -67,9 +67,7 @@ class Lanelet2(WrittenFormat):
         text = _Text()
         centres = {name: text.node(np.array(junction[:2])) for name, junction in made.junctions.items()}
         lanelets: list[tuple[str, str]] = []
-        stops: dict[str, list[tuple[str, str]]] = {
-            name: [] for name, at in made.junctions.items() if at.all_way_stop
-        }
+        stops: dict[str, list[tuple[str, str]]] = {name: [] for name, at in made.junctions.items() if at.all_way_stop}
         for road in made.roads:
             forward, backward = _road(text, road, centres)
             lanelets.append((forward, backward))
@@ -134,9 +132,7 @@ def _stopping(osm: Osm) -> set[str]:
     found: set[str] = set()
     for relation in osm.relations.values():
         if tags(relation).get("subtype") == "all_way_stop":
-            members = [
-                each for each in relation.findall("member") if each.get("role") in ("yield", "lanelet")
-            ]
+            members = [each for each in relation.findall("member") if each.get("role") in ("yield", "lanelet")]
             found |= {each.get("ref", "") for each in members}
     return found
 
@@ -161,49 +157,47 @@ class _Text:
         """Add a node; return its id."""
         x, y = float(place[0]), float(place[1])
         latitude, longitude = to_degrees(x, y + self._north, ORIGIN[1])
-        own = self._element("node", {"local_x": number_text(x), "local_y": number_text(y)})
-        own.set("lat", f"{latitude:.14f}")
-        own.set("lon", f"{longitude:.14f}")
-        self._nodes.append(own)
-        return own.get("id", "")
+        element = self._element("node", {"local_x": number_text(x), "local_y": number_text(y)})
+        element.set("lat", f"{latitude:.14f}")
+        element.set("lon", f"{longitude:.14f}")
+        self._nodes.append(element)
+        return element.get("id", "")
 
     def way(self, nodes: list[str], **what: str) -> str:
         """Add a linestring with tags; return its id."""
-        own = self._element("way", what)
+        way_element = self._element("way", what)
         for k, node in enumerate(nodes):
-            own.insert(k, Element("nd", ref=node))
-        self._ways.append(own)
-        return own.get("id", "")
+            way_element.insert(k, Element("nd", ref=node))
+        self._ways.append(way_element)
+        return way_element.get("id", "")
 
     def lanelet(self, left: str, right: str) -> str:
         """Add a lanelet between two linestrings; return its id."""
         what = {"type": "lanelet", "subtype": "road", "location": "urban", "one_way": "yes"}
-        own = self._element("relation", what | {"participant:vehicle": "yes"})
+        lanelet_element = self._element("relation", what | {"participant:vehicle": "yes"})
         for k, (way, role) in enumerate(((left, "left"), (right, "right"))):
-            own.insert(k, Element("member", type="way", ref=way, role=role))
-        self._relations[own.get("id", "")] = own
-        return own.get("id", "")
+            lanelet_element.insert(k, Element("member", type="way", ref=way, role=role))
+        self._relations[lanelet_element.get("id", "")] = lanelet_element
+        return lanelet_element.get("id", "")
 
     def all_way_stop(self, pairs: list[tuple[str, str]]) -> None:
         """Add a regulatory element for lanelets, each with the line where it stops."""
-        own = self._element("relation", {"type": "regulatory_element", "subtype": "all_way_stop"})
-        name = own.get("id", "")
+        element = self._element("relation", {"type": "regulatory_element", "subtype": "all_way_stop"})
+        name = element.get("id", "")
         members = [("relation", lanelet, "yield") for lanelet, _ in pairs]
         members += [("way", line, "ref_line") for _, line in pairs]
         for k, (kind, ref, role) in enumerate(members):
-            own.insert(k, Element("member", type=kind, ref=ref, role=role))
+            element.insert(k, Element("member", type=kind, ref=ref, role=role))
         for lanelet, _ in pairs:
-            self._relations[lanelet].insert(
-                2, Element("member", type="relation", ref=name, role="regulatory_element")
-            )
-        self._relations[name] = own
+            self._relations[lanelet].insert(2, Element("member", type="relation", ref=name, role="regulatory_element"))
+        self._relations[name] = element
 
     def _element(self, kind: str, what: dict[str, str]) -> Element:
         self._count += 1
-        own = Element(kind, id=str(self._count), visible="true", version="1")
+        element = Element(kind, id=str(self._count), visible="true", version="1")
         for key, value in what.items():
-            SubElement(own, "tag", k=key, v=value)
-        return own
+            SubElement(element, "tag", k=key, v=value)
+        return element
 
 
 def _road(text: _Text, road: Road, centres: dict[str, str]) -> tuple[str, str]:

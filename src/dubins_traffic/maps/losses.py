@@ -173,10 +173,7 @@ class Losses:
         ) + ("" if self.w == W else f"; lanes of 2w, w = {self.w:.6g} m")
         rows = [("", "roads", "metres", "why"), *((a, str(n), f"{m:.0f}", b) for a, b, n, m in self.rows())]
         wide = [max(len(row[k]) for row in rows) for k in range(3)]
-        table = [
-            f"{row[0]:<{wide[0]}}  {row[1]:>{wide[1]}}  {row[2]:>{wide[2]}}  {row[3]}".rstrip()
-            for row in rows
-        ]
+        table = [f"{row[0]:<{wide[0]}}  {row[1]:>{wide[1]}}  {row[2]:>{wide[2]}}  {row[3]}".rstrip() for row in rows]
         return [head, *table]
 
 
@@ -188,15 +185,11 @@ class NothingHeldError(InputError):
 
     def __init__(self, losses: Losses, file: str | None) -> None:
         self.losses = losses
-        why = "; ".join(f"{own} ({count(n, 'road')}, {metres:.0f} m)" for _, own, n, metres in losses.rows())
-        super().__init__(
-            f"nothing of the map can be held: {why}", file=file, expected="roads that a network can hold"
-        )
+        why = "; ".join(f"{reason} ({count(n, 'road')}, {metres:.0f} m)" for _, reason, n, metres in losses.rows())
+        super().__init__(f"nothing of the map can be held: {why}", file=file, expected="roads that a network can hold")
 
 
-def losses(
-    outcomes: Sequence[Outcome], tolerance: float, scale: float, segments: int, w: float = W
-) -> Losses:
+def losses(outcomes: Sequence[Outcome], tolerance: float, scale: float, segments: int, w: float = W) -> Losses:
     """Return what became of roads."""
     fates = tuple(_fate(each, tolerance) for each in outcomes)
     lines = {id(line): line for each in outcomes for line in each.lines}

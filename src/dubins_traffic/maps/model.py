@@ -130,9 +130,7 @@ class RoadMap:
         field = f"road {road.name}"
         for end in (road.first, road.last):
             if end not in self.junctions:
-                raise InputError(
-                    "ends at no junction", file=file, field=field, value=end, expected="a junction"
-                )
+                raise InputError("ends at no junction", file=file, field=field, value=end, expected="a junction")
         if len(road.line) < 2 or not _is_place(road.line):
             expected = f"two points or more, each with {_PLACE}"
             raise InputError("not a line", file=file, field=field, expected=expected)

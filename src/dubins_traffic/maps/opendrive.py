@@ -172,9 +172,7 @@ def _piece(reader: Reader, geometry: Element) -> Floats:
     if shape.tag == "poly3":
         return cubic_over(where, _coefficients(reader, shape, "abcd", ""))
     last = where.length if shape.get("pRange", "normalized") == "arcLength" else 1.0
-    return cubic(
-        where, _coefficients(reader, shape, "abcd", "U"), _coefficients(reader, shape, "abcd", "V"), last
-    )
+    return cubic(where, _coefficients(reader, shape, "abcd", "U"), _coefficients(reader, shape, "abcd", "V"), last)
 
 
 _SHAPES = ("line", "arc", "spiral", "poly3", "paramPoly3")
@@ -207,11 +205,7 @@ def _lanes(reader: Reader, road: Element) -> tuple[int, int, float]:
         [lane for lane in section.findall(f"{side}/lane") if lane.get("type") in FOR_CARS]
         for side in (along_it, against_it)
     ]
-    widths = [
-        reader.number(width, "a")
-        for lane in (*sides[0], *sides[1])
-        if (width := lane.find("width")) is not None
-    ]
+    widths = [reader.number(width, "a") for lane in (*sides[0], *sides[1]) if (width := lane.find("width")) is not None]
     usual = max(widths, default=LANE_WIDTH)
     return len(sides[0]), len(sides[1]), usual if usual > 0.0 else LANE_WIDTH
 
@@ -227,9 +221,7 @@ def _road(
     first, last = made.junctions[road.first], made.junctions[road.last]
     pieces = chain((first.x, first.y), road.corners or (), (last.x, last.y))
     length = sum(piece.length for piece in pieces)
-    element = SubElement(
-        root, "road", id=str(number), name=road.name, junction="-1", length=number_text(length)
-    )
+    element = SubElement(root, "road", id=str(number), name=road.name, junction="-1", length=number_text(length))
     link = SubElement(element, "link")
     for tag, at, here in (("predecessor", road.first, "start"), ("successor", road.last, "end")):
         others = [end for end in meet[at] if end != (number, here)]
@@ -291,9 +283,7 @@ def clothoid(place: Placed, begin: float, end: float) -> Floats:
     turn = begin * s + 0.5 * (end - begin) * s * s / max(place.length, 1e-300)
     # Simpson's rule on each of `count` stretches.
     step = place.length / count
-    steps = [
-        step / 6.0 * (each[:-1:2] + 4.0 * each[1::2] + each[2::2]) for each in (np.cos(turn), np.sin(turn))
-    ]
+    steps = [step / 6.0 * (each[:-1:2] + 4.0 * each[1::2] + each[2::2]) for each in (np.cos(turn), np.sin(turn))]
     points = np.concatenate([np.zeros((1, 2)), np.cumsum(np.stack(steps, axis=-1), axis=0)])
     return _moved(place, points)
 

@@ -96,8 +96,8 @@ def _roads(osm: Osm, name: str, way: Element, nodes: list[str], cuts: set[str]) 
     made: list[Road] = []
     for part, (begin, end) in enumerate(pairwise(places)):
         line = np.array([osm.nodes[node] for node in nodes[begin : end + 1]])
-        own = f"{name}#{part}" if len(places) > 2 else name
-        made.append(Road(own, nodes[begin], nodes[end], line, forward, backward, width, None, closed))
+        label = f"{name}#{part}" if len(places) > 2 else name
+        made.append(Road(label, nodes[begin], nodes[end], line, forward, backward, width, None, closed))
     return made
 
 
@@ -172,7 +172,7 @@ def read_osm(text: str, file: str | None = None) -> Osm:
     ways = reader.unique(iter(root.findall("way")))
     relations = reader.unique(iter(root.findall("relation")))
     signs = {name: tags(each) for name, each in nodes.items() if len(each)}
-    stops = {name: own.get("stop", "") for name, own in signs.items() if own.get("highway") == "stop"}
+    stops = {name: sign.get("stop", "") for name, sign in signs.items() if sign.get("highway") == "stop"}
     return Osm(reader, _places(reader, nodes), ways, relations, stops)
 
 
@@ -187,14 +187,14 @@ def tags(element: Element) -> dict[str, str]:
 
 
 def _places(reader: Reader, nodes: Mapping[str, Element]) -> dict[str, tuple[float, float]]:
-    own = {name: tags(each) for name, each in nodes.items()}
-    if own and all("local_x" in each and "local_y" in each for each in own.values()):
+    given = {name: tags(each) for name, each in nodes.items()}
+    if given and all("local_x" in each and "local_y" in each for each in given.values()):
         return {
             name: (
                 reader.parsed(each["local_x"], f"node[{name}]"),
                 reader.parsed(each["local_y"], f"node[{name}]"),
             )
-            for name, each in own.items()
+            for name, each in given.items()
         }
     found = {
         name: (_degrees(reader, each, "lat", 85.0), _degrees(reader, each, "lon", 180.0))
@@ -215,9 +215,7 @@ def _degrees(reader: Reader, node: Element, name: str, most: float) -> float:
     value = reader.number(node, name)
     if abs(value) > most:
         field = f"{place(node)}.{name}"
-        raise InputError(
-            "out of range", file=reader.file, field=field, value=value, expected=f"degrees up to {most:g}"
-        )
+        raise InputError("out of range", file=reader.file, field=field, value=value, expected=f"degrees up to {most:g}")
     return value
 
 
@@ -260,6 +258,4 @@ def _conformal(tau: float) -> float:
 
 def _slope(tau: float) -> float:
     """Return about how fast the latitude's tangent grows with the conformal latitude's."""
-    return (1.0 + (1.0 - _E * _E) * tau * tau) / (
-        (1.0 - _E * _E) * hypot(1.0, tau) * hypot(1.0, _conformal(tau))
-    )
+    return (1.0 + (1.0 - _E * _E) * tau * tau) / ((1.0 - _E * _E) * hypot(1.0, tau) * hypot(1.0, _conformal(tau)))

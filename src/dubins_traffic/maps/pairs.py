@@ -32,18 +32,18 @@ UNEVEN = 2.0
 """Two pieces are lanes of one road where they are nowhere farther apart than so many times that distance."""
 
 
-def merged(found: RoadMap, within: float) -> RoadMap:
+def merged(road_map: RoadMap, within: float) -> RoadMap:
     """Return a map whose pairs of one-way roads at most `within` metres apart are roads with one lane each way."""
     ways = {
         k: _forward(road)
-        for k, road in enumerate(found.roads)
+        for k, road in enumerate(road_map.roads)
         if bool(road.forward) != bool(road.backward) and not road.closed
     }
     if not ways:
-        return found
+        return road_map
     beside = _Sides(ways, within)
     union = Union[str]()
-    places = {name: np.array(junction[:2]) for name, junction in found.junctions.items()}
+    places = {name: np.array(junction[:2]) for name, junction in road_map.junctions.items()}
     cuts: dict[int, dict[str, float]] = {k: {} for k in ways}
     for way in ways.values():
         for name, begins in ((way.first, True), (way.last, False)):
@@ -52,11 +52,11 @@ def merged(found: RoadMap, within: float) -> RoadMap:
                 continue
             k, metres = facing
             union.join((name, _cut(cuts[k], ways[k], k, metres, name, SNAP * within, places)))
-    junctions, named = _joined(union, places, found.junctions)
+    junctions, named = _joined(union, places, road_map.junctions)
     whole, pieces = list[Road](), list[Road]()
-    for k, road in enumerate(found.roads):
-        own = _pieces(ways[k], cuts[k]) if k in ways else [road]
-        for piece in own:
+    for k, road in enumerate(road_map.roads):
+        parts = _pieces(ways[k], cuts[k]) if k in ways else [road]
+        for piece in parts:
             first, last = named(piece.first), named(piece.last)
             if first == last and piece.first != piece.last and piece.length <= INSIDE * within:
                 continue
@@ -105,9 +105,7 @@ class _Sides:
         """
         x, y = np.floor(point / self._cell).astype(np.int64).tolist()
         cells = [(x + i, y + j) for i in (-1, 0, 1) for j in (-1, 0, 1)]
-        sides = np.array(
-            sorted(set[int]().union(*(self._cells.get(cell, set()) for cell in cells))), dtype=np.int64
-        )
+        sides = np.array(sorted(set[int]().union(*(self._cells.get(cell, set()) for cell in cells))), dtype=np.int64)
         if not len(sides):
             return None
         begin, step, length = self._begin[sides], self._step[sides], self._length[sides]
@@ -121,9 +119,7 @@ class _Sides:
         least = int(np.argmin(far))
         if far[least] == np.inf or ends[least]:
             return None
-        return int(self._owner[sides[least]]), float(
-            self._before[sides[least]] + share[least] * length[least]
-        )
+        return int(self._owner[sides[least]]), float(self._before[sides[least]] + share[least] * length[least])
 
 
 def _cut(
@@ -170,9 +166,7 @@ def _pieces(way: Road, cuts: dict[str, float]) -> list[Road]:
     stops = sorted((metres, name) for name, metres in cuts.items())
     ends = [(0.0, way.first), *stops, (way.length, way.last)]
     return [
-        replace(
-            way, name=f"{way.name}#{k}", first=a, last=b, line=stretch(way.line, begin, end), corners=None
-        )
+        replace(way, name=f"{way.name}#{k}", first=a, last=b, line=stretch(way.line, begin, end), corners=None)
         for k, ((begin, a), (end, b)) in enumerate(pairwise(ends))
     ]
 

@@ -40,7 +40,7 @@ class Clip:
             raise InputError("not a rectangle", file=CLIP, value=text, expected=BOX)
         return cls(x0, y0, x1, y1)
 
-    def holds(self, points: Floats, found: RoadMap, file: str | None) -> npt.NDArray[np.bool_]:  # noqa: ARG002  # as `Around`
+    def holds(self, points: Floats, road_map: RoadMap, file: str | None) -> npt.NDArray[np.bool_]:  # noqa: ARG002  # as `Around`
         """Tell of points (N, 2) of a map which are in the rectangle."""
         x, y = points[:, 0], points[:, 1]
         inside: npt.NDArray[np.bool_] = (self.x0 <= x) & (x <= self.x1) & (self.y0 <= y) & (y <= self.y1)
@@ -59,19 +59,17 @@ class Around:
 
     def __post_init__(self) -> None:
         if not (np.isfinite(self.radius) and self.radius > 0.0):
-            raise InputError(
-                "not a radius", file=AROUND, value=self.radius, expected="metres of the map, above 0"
-            )
+            raise InputError("not a radius", file=AROUND, value=self.radius, expected="metres of the map, above 0")
 
-    def holds(self, points: Floats, found: RoadMap, file: str | None) -> npt.NDArray[np.bool_]:
+    def holds(self, points: Floats, road_map: RoadMap, file: str | None) -> npt.NDArray[np.bool_]:
         """Tell of points (N, 2) of a map which are so near; InputError if the map has no such junction."""
-        if self.junction not in found.junctions:
-            like = get_close_matches(self.junction, found.junctions, 3, 0.0) or list(found.junctions)[:3]
+        if self.junction not in road_map.junctions:
+            like = get_close_matches(self.junction, road_map.junctions, 3, 0.0) or list(road_map.junctions)[:3]
             raise InputError(
                 "no such junction", file=file, field=AROUND, value=self.junction,
-                expected=f"one of the map's {len(found.junctions)}, such as {', '.join(like)}",
+                expected=f"one of the map's {len(road_map.junctions)}, such as {', '.join(like)}",
             )  # fmt: skip
-        x, y, _ = found.junctions[self.junction]
+        x, y, _ = road_map.junctions[self.junction]
         far: Floats = np.hypot(points[:, 0] - x, points[:, 1] - y)
         return far <= self.radius
 
@@ -82,7 +80,7 @@ class Around:
 Part = Clip | Around
 
 
-def part_of(found: RoadMap, part: Part, file: str | None = None) -> RoadMap:
+def part_of(road_map: RoadMap, part: Part, file: str | None = None) -> RoadMap:
     """Return the roads of a map that lie wholly in a part of it, and their junctions.
 
     Raises
@@ -90,13 +88,13 @@ def part_of(found: RoadMap, part: Part, file: str | None = None) -> RoadMap:
     InputError
         If no road does, or the junction is none of the map.
     """
-    roads = tuple(road for road in found.roads if part.holds(road.line, found, file).all())
+    roads = tuple(road for road in road_map.roads if part.holds(road.line, road_map, file).all())
     if not roads:
         raise InputError(
             "no road lies wholly in this part", file=file, field=str(part),
-            expected=f"a part that holds some of the map's {len(found.roads)} roads",
+            expected=f"a part that holds some of the map's {len(road_map.roads)} roads",
         )  # fmt: skip
-    return map_of(found.junctions, roads)
+    return map_of(road_map.junctions, roads)
 
 
 class NoLoopError(NothingHeldError):

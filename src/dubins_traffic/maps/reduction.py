@@ -154,24 +154,22 @@ def _lost(
     return losses(outcomes, settings.tolerance, scale, len(draft.strands), settings.w)
 
 
-def _reasons(
-    road: Road, number: int, dropped: Mapping[int, Reason], width: float, held: bool
-) -> tuple[Reason, ...]:
+def _reasons(road: Road, number: int, dropped: Mapping[int, Reason], width: float, held: bool) -> tuple[Reason, ...]:
     """Return why a road is altered, or dropped: what the file says of it, then what the network can't hold."""
-    found: list[Reason] = []
+    reasons: list[Reason] = []
     if road.closed:
-        found.append(Reason.CLOSED)
+        reasons.append(Reason.CLOSED)
     if not (road.forward and road.backward):
-        found.append(Reason.ONE_WAY)
+        reasons.append(Reason.ONE_WAY)
     if max(road.forward, road.backward) > 1:
-        found.append(Reason.LANES)
+        reasons.append(Reason.LANES)
     if road.pair and held:
-        found.append(Reason.PAIR)
+        reasons.append(Reason.PAIR)
     if held:
-        return (*found, Reason.WIDTH) if abs(road.lane_width - width) > WIDTH_PLAY * width else tuple(found)
+        return (*reasons, Reason.WIDTH) if abs(road.lane_width - width) > WIDTH_PLAY * width else tuple(reasons)
     if number in dropped:
-        return (dropped[number], *found)
-    return tuple(found) or (Reason.APART,)
+        return (dropped[number], *reasons)
+    return tuple(reasons) or (Reason.APART,)
 
 
 def _document(draft: Draft, scale: float) -> dict[str, Any]:

@@ -88,9 +88,7 @@ class ImportSettings:
 
     def _check(self, name: str, value: float, low: float, high: float) -> None:
         if not (isfinite(value) and low <= value <= high):
-            raise InputError(
-                "out of range", field=name, value=value, expected=f"a number in [{low:g}, {high:g}]"
-            )
+            raise InputError("out of range", field=name, value=value, expected=f"a number in [{low:g}, {high:g}]")
 
     @property
     def disc(self) -> float:

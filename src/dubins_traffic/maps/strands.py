@@ -40,9 +40,7 @@ class Strand:
         return self if self.last == name else self.backward()
 
 
-def strands_of(
-    roads: Sequence[Road], numbers: Iterable[int], junctions: Mapping[str, Junction]
-) -> list[Strand]:
+def strands_of(roads: Sequence[Road], numbers: Iterable[int], junctions: Mapping[str, Junction]) -> list[Strand]:
     """Return the strands of some roads: two that meet alone at a junction become one."""
     rows: dict[int, Strand] = {}
     meet: dict[str, list[int]] = {}
@@ -118,8 +116,7 @@ def _split(strand: Strand, parts: int, straight: float, added: dict[str, Junctio
     cuts.append(length)
     names.append(strand.last)
     return [
-        Strand(strand.roads, names[k], names[k + 1], stretch(strand.line, cuts[k], cuts[k + 1]))
-        for k in range(parts)
+        Strand(strand.roads, names[k], names[k + 1], stretch(strand.line, cuts[k], cuts[k + 1])) for k in range(parts)
     ]
 
 
@@ -219,9 +216,9 @@ class Contraction:
         name = f"{gone.first}+{gone.last}"
         self._junctions[name] = Junction(*place, a.all_way_stop and b.all_way_stop)
         ends = [self._meet.pop(end) for end in (gone.first, gone.last)]
-        self._meet[name] = [k for own in ends for k in own if k != s]
-        for end, own in zip((gone.first, gone.last), ends, strict=True):
-            for k in own:
+        self._meet[name] = [k for end in ends for k in end if k != s]
+        for end, way_end in zip((gone.first, gone.last), ends, strict=True):
+            for k in way_end:
                 while k != s and end in (self._rows[k].first, self._rows[k].last):
                     self._rows[k] = moved(self._rows[k], end, name, place)
         touched = set(self._meet[name])

@@ -46,9 +46,7 @@ class SumoNet(WrittenFormat):
             name: Junction(reader.number(each, "x"), reader.number(each, "y"), each.get("type") == STOP)
             for name, each in found.items()
         }
-        edges = reader.unique(
-            each for each in root.iter("edge") if each.get("function", "normal") == "normal"
-        )
+        edges = reader.unique(each for each in root.iter("edge") if each.get("function", "normal") == "normal")
         directions = [_direction(reader, each, junctions) for each in edges.values()]
         made = RoadMap(junctions, paired([one for one in directions if one.lanes]))
         return with_hints(made, text, file).checked(file)
@@ -58,9 +56,7 @@ class SumoNet(WrittenFormat):
         places = np.concatenate([road.line for road in made.roads])
         box = ",".join(number_text(float(each)) for each in (*places.min(axis=0), *places.max(axis=0)))
         root = Element("net", version="1.20", junctionCornerDetail="5", limitTurnSpeed="5.50")
-        SubElement(
-            root, "location", netOffset="0.00,0.00", convBoundary=box, origBoundary=box, projParameter="!"
-        )
+        SubElement(root, "location", netOffset="0.00,0.00", convBoundary=box, origBoundary=box, projParameter="!")
         lanes: list[Lane] = []
         for number, road in enumerate(made.roads):
             lanes += _lanes(number, road)
@@ -74,8 +70,8 @@ class SumoNet(WrittenFormat):
         links = {name: _links(into[name], out[name]) for name in made.junctions}
         for name in made.junctions:
             _junction(root, name, made, into[name], links[name])
-        for name, own in links.items():
-            _connections(root, own, made.junctions[name].all_way_stop)
+        for name, link in links.items():
+            _connections(root, link, made.junctions[name].all_way_stop)
         return document(root, hints_text(made, [road.name for road in made.roads]))
 
 
@@ -84,9 +80,7 @@ def _direction(reader: Reader, edge: Element, junctions: dict[str, Junction]) ->
     for name, end in (("from", first), ("to", last)):
         if end not in junctions:
             field = f"{place(edge)}.{name}"
-            raise InputError(
-                "no such junction", file=reader.file, field=field, value=end, expected="a junction's id"
-            )
+            raise InputError("no such junction", file=reader.file, field=field, value=end, expected="a junction's id")
     every = edge.findall("lane")
     if not every:
         raise reader.fault("has no lanes", edge, edge.get("id"), "at least one <lane>")
@@ -97,9 +91,7 @@ def _direction(reader: Reader, edge: Element, junctions: dict[str, Junction]) ->
         raise reader.fault("not the width of a lane", edge, min(widths), "metres above 0")
     width = max(widths, default=LANE_WIDTH)
     shape = edge.get("shape")
-    line = (
-        read_shape(reader, edge, shape) if shape else np.array([junctions[end][:2] for end in (first, last)])
-    )
+    line = read_shape(reader, edge, shape) if shape else np.array([junctions[end][:2] for end in (first, last)])
     return OneWay(str(edge.get("id")), first, last, line, len(lanes), width, closed=not cars)
 
 
@@ -118,14 +110,10 @@ def read_shape(reader: Reader, element: Element, text: str) -> Floats:
     for point in text.split():
         parts = point.split(",")
         if len(parts) not in (2, 3):
-            raise InputError(
-                "not a point", file=reader.file, field=field, value=point, expected="x,y or x,y,z"
-            )
+            raise InputError("not a point", file=reader.file, field=field, value=point, expected="x,y or x,y,z")
         rows.append((reader.parsed(parts[0], field), reader.parsed(parts[1], field)))
     if len(rows) < 2:
-        raise InputError(
-            "not a line", file=reader.file, field=field, value=text, expected="two points or more"
-        )
+        raise InputError("not a line", file=reader.file, field=field, value=text, expected="two points or more")
     return np.array(rows)
 
 
@@ -172,9 +160,7 @@ def _links(into: list[Lane], out: list[Lane]) -> list[tuple[Lane, Lane]]:
     return [(a, b) for a in into for b in out if b.road != a.road or len(out) == 1]
 
 
-def _junction(
-    root: Element, name: str, made: RoadMap, into: list[Lane], links: list[tuple[Lane, Lane]]
-) -> None:
+def _junction(root: Element, name: str, made: RoadMap, into: list[Lane], links: list[tuple[Lane, Lane]]) -> None:
     junction = made.junctions[name]
     kind = "allway_stop" if junction.all_way_stop else "priority"
     size = max(made.roads[lane.road].lane_width for lane in into)
@@ -192,8 +178,6 @@ def _junction(
 
 def _connections(root: Element, links: list[tuple[Lane, Lane]], stop: bool) -> None:
     for a, b in links:
-        element = SubElement(
-            root, "connection", {"from": a.edge, "to": b.edge, "fromLane": "0", "toLane": "0"}
-        )
+        element = SubElement(root, "connection", {"from": a.edge, "to": b.edge, "fromLane": "0", "toLane": "0"})
         element.set("dir", "t" if a.road == b.road else DIRECTIONS[turn(a.into, b.out)])
         element.set("state", "w" if stop else "M")

@@ -68,9 +68,7 @@ class _Builder:
         self._depth += 1
         self._count += 1
         if self._depth > DEEPEST:
-            raise InputError(
-                "nested too deep", file=self._file, field=tag, expected=f"at most {DEEPEST} levels"
-            )
+            raise InputError("nested too deep", file=self._file, field=tag, expected=f"at most {DEEPEST} levels")
         if self._count > MOST_ELEMENTS:
             raise InputError("too many elements", file=self._file, expected=f"at most {MOST_ELEMENTS}")
         self._tree.start(tag, attributes)
@@ -104,9 +102,7 @@ class Reader:
         """Return an attribute that must be there."""
         value = element.get(name)
         if value is None:
-            raise InputError(
-                "missing", file=self.file, field=f"{place(element)}.{name}", expected="an attribute"
-            )
+            raise InputError("missing", file=self.file, field=f"{place(element)}.{name}", expected="an attribute")
         return value
 
     def number(self, element: Element, name: str, default: float | None = None) -> float:
@@ -123,9 +119,7 @@ class Reader:
         except ValueError:
             number = math.nan
         if not math.isfinite(number):
-            raise InputError(
-                "not a number", file=self.file, field=field, value=text, expected="a finite number"
-            )
+            raise InputError("not a number", file=self.file, field=field, value=text, expected="a finite number")
         if abs(number) > LARGEST_NUMBER:
             expected = f"at most {LARGEST_NUMBER:g} in size"
             raise InputError("too large", file=self.file, field=field, value=text, expected=expected)

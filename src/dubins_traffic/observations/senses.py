@@ -89,9 +89,7 @@ class Senses:
         others = tuple(
             [
                 new(SensedCar, (name, car, new(Pose, (x, y, c, s)), new(Twist, (speed, yaw)), body, labelled))
-                for (name, car, labelled), (x, y, c, s, speed, yaw) in zip(
-                    self._seen[1:], reals[1:], strict=True
-                )
+                for (name, car, labelled), (x, y, c, s, speed, yaw) in zip(self._seen[1:], reals[1:], strict=True)
             ]
         )
         x, y, c, s, speed, yaw = reals[0]

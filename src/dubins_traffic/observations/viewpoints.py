@@ -38,17 +38,17 @@ def turn_round(trials: Ints, views: ViewTables) -> None:
 
 
 @jit
-def show(b: int, n: int, row: int, state: State, labels: Labels, own: State, named: Labels) -> None:
-    """Fill row `row` (row) of `own` and `named` with the cars of trial b, car n first."""
-    own.count[row] = state.count[b]
+def show(b: int, n: int, row: int, state: State, labels: Labels, seen_state: State, named: Labels) -> None:
+    """Fill row `row` (row) of `seen_state` and `named` with the cars of trial b, car n first."""
+    seen_state.count[row] = state.count[b]
     for car in range(state.count[b]):
         place = 0 if car == n else (car + 1 if car < n else car)
-        own.x[row, place] = state.x[b, car]
-        own.y[row, place] = state.y[b, car]
-        own.c[row, place] = state.c[b, car]
-        own.s[row, place] = state.s[b, car]
-        own.speed[row, place] = state.speed[b, car]
-        own.yaw_rate[row, place] = state.yaw_rate[b, car]
+        seen_state.x[row, place] = state.x[b, car]
+        seen_state.y[row, place] = state.y[b, car]
+        seen_state.c[row, place] = state.c[b, car]
+        seen_state.s[row, place] = state.s[b, car]
+        seen_state.speed[row, place] = state.speed[b, car]
+        seen_state.yaw_rate[row, place] = state.yaw_rate[b, car]
         named.segment[row, place] = labels.segment[b, car]
         named.at[row, place] = labels.at[b, car]
         named.crosses[row, place] = labels.crosses[b, car]

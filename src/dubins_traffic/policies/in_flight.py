@@ -33,9 +33,7 @@ class Patience(NamedTuple):
 
 
 @jit_inline
-def settle(
-    bits: Any, tick: int, first_since: int, clear_since: int, patience: Patience
-) -> tuple[Any, int, int]:
+def settle(bits: Any, tick: int, first_since: int, clear_since: int, patience: Patience) -> tuple[Any, int, int]:
     """Return flags in which a car is first only if that lasts until its next command takes effect.
 
     With its flags, `bits` (count), come the ticks since which it is first, and first at a clear crossing, -1 if it is

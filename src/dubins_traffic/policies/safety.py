@@ -106,11 +106,11 @@ def motion_is_safe(pose: Pose, command: Command, car: Mover, other: Box, travel:
     -----
     A car that stands is never at fault in a collision, and neither is one that moves away.
     """
-    own = moved_by(command, car)
-    if own == 0.0:
+    driven = moved_by(command, car)
+    if driven == 0.0:
         return True
-    gap, least, last = gaps(pose, command, car, other, own + travel + GUARD)
-    return least > travel + GUARD or (least == gap and last - gap > 0.2 * own)
+    gap, least, last = gaps(pose, command, car, other, driven + travel + GUARD)
+    return least > travel + GUARD or (least == gap and last - gap > 0.2 * driven)
 
 
 @jit_inline
@@ -121,9 +121,9 @@ def keeps_clear(pose: Pose, command: Command, car: Mover, other: Box, travel: fl
     another side: so only one that drives straight on may be touched (`slides_on`). `travel` (m) is as in
     `motion_is_safe`. All cars are alike.
     """
-    own = moved_by(command, car)
-    _, least, _ = gaps(pose, command, car, other, own + travel + GUARD)
-    if own == 0.0 or least > travel + GUARD:
+    driven = moved_by(command, car)
+    _, least, _ = gaps(pose, command, car, other, driven + travel + GUARD)
+    if driven == 0.0 or least > travel + GUARD:
         return True
     if car.half_length == 0.0:
         return stays_ahead(pose, command, car, other, travel)

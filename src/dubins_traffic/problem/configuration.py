@@ -100,12 +100,12 @@ class Configuration:
         InputError
             For the first thing wrong, with its field.
         """
-        own = plain(document, file)
+        given = plain(document, file)
         if rnd is not None:
-            own.pop("network", None)
-            own["rnd"] = os.fspath(rnd)
+            given.pop("network", None)
+            given["rnd"] = os.fspath(rnd)
             folder = None
-        settings = settings_of(own, file)
+        settings = settings_of(given, file)
         try:
             network_file = _network_file(settings, folder)
             network = _network(settings, network_file)
@@ -115,7 +115,7 @@ class Configuration:
                     check_goal(network, goal, k)
         except InputError as error:
             raise error.within(file=file) from None
-        return Configuration(own, settings, network, agents, file, network_file)
+        return Configuration(given, settings, network, agents, file, network_file)
 
     def with_simulator(self, name: str) -> Configuration:
         """Return the configuration with another simulator; its document stays as it was read."""
@@ -188,9 +188,7 @@ def find_source(name: str | os.PathLike[str]) -> Source:
         return Source(text, None, item.read_text(encoding="utf-8"))
     if text != "-" and not exists(text) and not Path(text).suffix and os.sep not in text:
         known = ", ".join(shipped_names())
-        raise InputError(
-            "no such file or shipped configuration", file=text, expected=f"a file or one of {known}"
-        )
+        raise InputError("no such file or shipped configuration", file=text, expected=f"a file or one of {known}")
     return read_source(text)
 
 
@@ -200,9 +198,7 @@ def shipped_names() -> list[str]:
     return sorted(item.name.removesuffix(".json") for item in folder.iterdir() if item.name.endswith(".json"))
 
 
-def check_goal(
-    network: RoadNetwork, goal: list[float] | tuple[float, ...], index: int
-) -> tuple[float, float]:
+def check_goal(network: RoadNetwork, goal: list[float] | tuple[float, ...], index: int) -> tuple[float, float]:
     """Return the `index`-th goal as a lattice point.
 
     Raises
@@ -281,9 +277,7 @@ def plan_agents(entries: list[AgentEntry]) -> tuple[PlannedAgent, ...]:
         start = pose_of(*entry.start) if entry.start is not None else None
         for name in _names(entry, counters):
             if name == "ego" or name in taken:
-                problem = (
-                    "an e-agent can't be called ego" if name == "ego" else f"name taken by {taken[name]}"
-                )
+                problem = "an e-agent can't be called ego" if name == "ego" else f"name taken by {taken[name]}"
                 raise InputError(problem, field=f"{where}.name", value=name, expected="a name of its own")
             taken[name] = where
             agents.append(PlannedAgent(EAgent(kind, name, entry.type, parameters), start, where))

@@ -97,15 +97,15 @@ def instance_from_document(
     InputError
         For the first thing wrong, with its field.
     """
-    own = plain(document, file)
-    if version_of(own, file) == 0:
-        parse(InstanceModel0, own, file=file)
-        model = parse(InstanceModel, {key: own[key] for key in own if key in INSTANCE_0_KEYS}, file=file)
+    given = plain(document, file)
+    if version_of(given, file) == 0:
+        parse(InstanceModel0, given, file=file)
+        model = parse(InstanceModel, {key: given[key] for key in given if key in INSTANCE_0_KEYS}, file=file)
         known = INSTANCE_0_KEYS
     else:
-        model = parse(InstanceModel, own, file=file)
+        model = parse(InstanceModel, given, file=file)
         known = frozenset(info.alias or name for name, info in InstanceModel.model_fields.items())
-    extra = {key: value for key, value in own.items() if key not in known}
+    extra = {key: value for key, value in given.items() if key not in known}
     try:
         check_numbers(seed, trial)
         return _instance(model, extra, seed, trial)
@@ -191,9 +191,7 @@ def _placed(
         if name not in names:
             expected = f"one of {', '.join(names[:20])}"
             raise InputError("start of an unknown car", field="starts", value=name, expected=expected)
-    placed = tuple(
-        PlannedAgent(plan.agent, given.get(plan.agent.name, plan.start), plan.field) for plan in planned
-    )
+    placed = tuple(PlannedAgent(plan.agent, given.get(plan.agent.name, plan.start), plan.field) for plan in planned)
     return placed, Wish(given.get("ego") or origin_start(network, model.car.w), None, "starts.ego")
 
 

@@ -91,9 +91,7 @@ def check_numbers(seed: int, trial: int) -> None:
     """Refuse a seed or a number of a trial that is out of range."""
     for name, value, end in (("seed", seed, limits.SEEDS), ("trial", trial, limits.TRIALS)):
         if isinstance(value, bool) or not 0 <= value < end:
-            raise InputError(
-                f"not a {name}", field=name, value=value, expected=f"an integer >= 0 and < {end}"
-            )
+            raise InputError(f"not a {name}", field=name, value=value, expected=f"an integer >= 0 and < {end}")
 
 
 def _recipe(configuration: Configuration) -> Recipe:
@@ -179,9 +177,7 @@ class Recipe:
         check_obstructions(problem)
         if starts is None:
             draws = Draws(seed, trial, Stream.STARTS)
-            wishes = (
-                site.wishes if lanes is None else [site.wishes[0]._replace(lanes=lanes), *site.wishes[1:]]
-            )
+            wishes = site.wishes if lanes is None else [site.wishes[0]._replace(lanes=lanes), *site.wishes[1:]]
             starts = draw_starts(self._areas(site), self._car, wishes, draws)
         return Instance(
             problem=problem,
@@ -326,13 +322,11 @@ def origin_start(network: RoadNetwork, w: float) -> Pose | None:
 
 def drawn_cycle(agent: EAgent) -> bool:
     """Tell whether the cycle of a planned e-agent is drawn."""
-    own = agent.driver
-    return loops(own.kind, own.parameters) and own.parameters["cycle"] is None
+    driver = agent.driver
+    return loops(driver.kind, driver.parameters) and driver.parameters["cycle"] is None
 
 
-def complete_agents(
-    network: RoadNetwork, planned: Sequence[PlannedAgent], draws: Draws
-) -> tuple[EAgent, ...]:
+def complete_agents(network: RoadNetwork, planned: Sequence[PlannedAgent], draws: Draws) -> tuple[EAgent, ...]:
     """Return the e-agents with all that is random about them drawn; the planned ones themselves where nothing is."""
     return tuple([_completed(network, plan.agent, draws) for plan in planned])
 
@@ -396,7 +390,7 @@ def draw_cycle(network: RoadNetwork, draws: Draws) -> list[list[float]]:
         start = network.lane_ends(walk[-1])[1]
         for k, lane in enumerate(walk):
             if network.lane_ends(lane)[0] == start and lane in following:
-                return [list(network.intersections[network.lane_ends(own)[0]]) for own in walk[k:]]
+                return [list(network.intersections[network.lane_ends(lane)[0]]) for lane in walk[k:]]
         walk.append(following[draws.below(len(following))])
 
 
@@ -421,8 +415,6 @@ def cycle_lanes(network: RoadNetwork, points: Sequence[Sequence[float]]) -> tupl
         lane = next((lane for lane in network.arms(start) if network.lane_ends(lane)[1] == end), None)
         if lane is None:
             expected = "points that follow one another along segments, the last joined to the first"
-            raise InputError(
-                "no segment to the next point", field=f"cycle[{k}]", value=point, expected=expected
-            )
+            raise InputError("no segment to the next point", field=f"cycle[{k}]", value=point, expected=expected)
         lanes.append(lane)
     return tuple(lanes)

@@ -152,9 +152,7 @@ def dumps(document: Mapping[str, Any]) -> str:
     return "{\n" + ",\n".join(lines) + "\n}\n"
 
 
-def write_document(
-    document: Mapping[str, Any], path: str | os.PathLike[str], *, overwrite: bool = False
-) -> None:
+def write_document(document: Mapping[str, Any], path: str | os.PathLike[str], *, overwrite: bool = False) -> None:
     """Write a JSON object to `path`, whole or not at all.
 
     Raises
@@ -213,9 +211,7 @@ def _checked_text(text: str, path: str) -> str:
         text.encode()
     except UnicodeEncodeError as error:
         bad = text[error.start : error.end]
-        raise InputError(
-            "not a text", field=path or None, value=bad, expected="characters of Unicode"
-        ) from None
+        raise InputError("not a text", field=path or None, value=bad, expected="characters of Unicode") from None
     return text
 
 

@@ -94,17 +94,13 @@ class Follow(Strict):
     speed: Speed = Field(default=0.5, description="largest speed, m/s")
     yaw_rate: Speed = Field(default=0.9, description="largest yaw rate, rad/s")
     patience: Seconds | None = Field(default=5.0, description=PATIENCE)
-    sensing_only: bool = Field(
-        default=False, description="whether it sees the ego within the sensing radius only"
-    )
+    sensing_only: bool = Field(default=False, description="whether it sees the ego within the sensing radius only")
 
 
 class Parked(Strict):
     """Stands where it starts and, after a time, drives off as `wander` does."""
 
-    vacates_after: Seconds | None = Field(
-        default=30.0, description="seconds until it drives off; null: never"
-    )
+    vacates_after: Seconds | None = Field(default=30.0, description="seconds until it drives off; null: never")
     speed: Speed = Field(default=0.5, description="speed once it drives, m/s")
     patience: Seconds | None = Field(default=5.0, description=PATIENCE)
 
@@ -140,17 +136,13 @@ class _Driver(Strict):
 class Lawful(_Driver):
     """Keeps the rules of the road: right lane, stops, order of arrival; may be made to break named ones."""
 
-    rolls: Share = Field(
-        default=0.0, description="share of crossings entered without stopping or waiting (E1)"
-    )
+    rolls: Share = Field(default=0.0, description="share of crossings entered without stopping or waiting (E1)")
     left: Share = Field(default=0.0, description="share of roads driven on the left (E1)")
     blocks: Share = Field(default=0.0, description="share of intersections in which it stands for 9 s (E4)")
     tailgates: Share = Field(
         default=0.0, description="share of roads on which it hangs on to the car ahead at top speed (E2)"
     )
-    parks: Share = Field(
-        default=0.0, description="share of visits to a goal at which it parks there (E4, E6)"
-    )
+    parks: Share = Field(default=0.0, description="share of visits to a goal at which it parks there (E4, E6)")
     parks_for: Seconds = Field(default=90.0, description="longest time for which it parks, s")
 
 
@@ -172,9 +164,7 @@ class Choice(Strict):
     )
     speed: Share | None = Field(default=None, description="speed in the lane, as a share of the largest")
     pause: Seconds | None = Field(default=None, description="seconds for which it pauses in the lane")
-    pause_at: Share | None = Field(
-        default=None, description="share of the lane after which it does; null: 0.5"
-    )
+    pause_at: Share | None = Field(default=None, description="share of the lane after which it does; null: 0.5")
     hold: Seconds | None = Field(
         default=None, description="seconds of its own turn for which it holds at the line of the crossing"
     )
@@ -212,9 +202,7 @@ class Chosen(_Driver):
 class Free(Strict):
     """Does much that E1 to E6 allow and no other kind does, by commands or at random; the law takes over in time."""
 
-    boldness: Share = Field(
-        default=0.8, description="share of its time in which it does not do as the law says"
-    )
+    boldness: Share = Field(default=0.8, description="share of its time in which it does not do as the law says")
     commands: list[TimedCommand] = Field(
         default=[],
         max_length=limits.COMMANDS,
@@ -238,9 +226,7 @@ class Nudged(Strict):
     kind: Literal["wander", "loop", "follow", "parked", "scripted", "lawful", "nemesis", "chosen"] = Field(
         default="lawful", description="which kind"
     )
-    parameters: dict[str, Any] = Field(
-        default={}, description="its parameters; those left out have its defaults"
-    )
+    parameters: dict[str, Any] = Field(default={}, description="its parameters; those left out have its defaults")
     delay: Annotated[int, Field(ge=0, le=limits.REACTION)] = Field(
         default=3, description="how many ticks late it does what the kind asks for"
     )
@@ -255,10 +241,10 @@ class Nudged(Strict):
         if not isinstance(document, dict):
             return document
         given = cast("dict[str, Any]", document)
-        kind, own = given.get("kind", "lawful"), given.get("parameters", {})
-        if kind in NUDGEABLE and isinstance(own, dict):
+        kind, parameters = given.get("kind", "lawful"), given.get("parameters", {})
+        if kind in NUDGEABLE and isinstance(parameters, dict):
             try:
-                return {**given, "parameters": parameters_of(kind, cast("dict[str, Any]", own))}
+                return {**given, "parameters": parameters_of(kind, cast("dict[str, Any]", parameters))}
             except InputError as error:
                 field = "parameters" if error.field is None else error.field
                 raise fault(error.problem, str(error.expected), field, error.value) from None
@@ -291,9 +277,7 @@ class Remote(Strict):
 
 COUNTER = "counter"
 REMOTE = "remote"
-NUDGEABLE: frozenset[str] = frozenset(
-    {"wander", "loop", "follow", "parked", "scripted", "lawful", "nemesis", "chosen"}
-)
+NUDGEABLE: frozenset[str] = frozenset({"wander", "loop", "follow", "parked", "scripted", "lawful", "nemesis", "chosen"})
 """Kinds that can be nudged: those that run compiled."""
 OWN = "own"
 """A class of the user's, which the type names: ``module:Class`` or ``path/to/file.py:Class``."""

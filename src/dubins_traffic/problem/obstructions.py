@@ -100,9 +100,7 @@ class _Obstructions:
 
     def _bars(self, lane: int) -> int | None:
         """Return an obstacle that bars a lane or leaves the disc at its end no exit, None if there is none."""
-        return (
-            self.roads[lane >> 1] if lane >> 1 in self.roads else self.traps(self._network.lane_ends(lane)[1])
-        )
+        return self.roads[lane >> 1] if lane >> 1 in self.roads else self.traps(self._network.lane_ends(lane)[1])
 
     def _in_the_way(self, reached: Collection[int]) -> int:
         """Return an obstacle that bars a lane out of the intersections that are reached."""
@@ -154,8 +152,7 @@ class _Beside:
         length, step = float(self._network.lengths[segment]), STRETCH * self._w
         places = np.arange(0.0, length, step).tolist()
         return any(
-            self._narrows(2 * segment, s, s + step)
-            and self._narrows(2 * segment + 1, length - s - step, length - s)
+            self._narrows(2 * segment, s, s + step) and self._narrows(2 * segment + 1, length - s - step, length - s)
             for s in places
         )
 

@@ -47,9 +47,7 @@ class Laser(Strict):
     rays: Annotated[int, Field(ge=1, le=limits.RAYS)] = Field(default=300, description="number of rays")
     angle_min: Angle = Field(default=-2.0, description="bearing of the first ray, rad")
     angle_max: Angle = Field(default=2.0, description="bearing of the last ray, rad")
-    range_min: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(
-        default=0.08, description="smallest range, m"
-    )
+    range_min: Annotated[float, Field(ge=0, le=limits.METRES)] = Field(default=0.08, description="smallest range, m")
     range_max: Length = Field(default=5.0, description="largest range, m")
     rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(default=10.0, description="scans per second")
 
@@ -63,9 +61,7 @@ class Laser(Strict):
                 self.angle_max,
             )
         if self.range_max <= self.range_min:
-            raise fault(
-                "not a range", f"a number > range_min = {self.range_min}", "range_max", self.range_max
-            )
+            raise fault("not a range", f"a number > range_min = {self.range_min}", "range_max", self.range_max)
         return self
 
 
@@ -329,9 +325,7 @@ def _edges_meet(first: tuple[Any, Any], second: tuple[Any, Any], neighbours: boo
     if neighbours:
         shared, p, q = (b, a, d) if b == c else (a, b, c)
         folded = _side(shared, p, q) == 0
-        return (
-            folded and (p[0] - shared[0]) * (q[0] - shared[0]) + (p[1] - shared[1]) * (q[1] - shared[1]) > 0
-        )
+        return folded and (p[0] - shared[0]) * (q[0] - shared[0]) + (p[1] - shared[1]) * (q[1] - shared[1]) > 0
     sides = (_side(a, b, c), _side(a, b, d), _side(c, d, a), _side(c, d, b))
     if sides[0] * sides[1] < 0 and sides[2] * sides[3] < 0:
         return True

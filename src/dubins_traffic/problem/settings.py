@@ -41,9 +41,7 @@ def check_start(value: object) -> object:
 def _numbers(value: object) -> list[float]:
     """Return `value` as a list of finite numbers, an empty list if it is anything else."""
     row = cast("Sequence[object]", value) if isinstance(value, list | tuple) else ()
-    numbers = [
-        float(x) for x in row if isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e300
-    ]
+    numbers = [float(x) for x in row if isinstance(x, int | float) and not isinstance(x, bool) and abs(x) < 1e300]
     return numbers if len(numbers) == len(row) else []
 
 
@@ -119,18 +117,14 @@ class AgentEntry(Careful):
     name: str = Field(
         default="agent", pattern=NAME, description="its name; with count the names are this and 0, 1, 2, ..."
     )
-    count: Annotated[int, Field(ge=0, le=limits.CARS)] | None = Field(
-        default=None, description="how many of them"
-    )
+    count: Annotated[int, Field(ge=0, le=limits.CARS)] | None = Field(default=None, description="how many of them")
     parameters: dict[str, Any] = Field(default={}, description="parameters of its kind")
     start: GivenPose = Field(default=None, description="[x, y, theta]; left out: drawn")
 
     @model_validator(mode="after")
     def _single_start(self) -> AgentEntry:
         if self.start is not None and self.count is not None and self.count > 1:
-            raise fault(
-                "one start for several e-agents", "1, or left out, where start is given", "count", self.count
-            )
+            raise fault("one start for several e-agents", "1, or left out, where start is given", "count", self.count)
         return self
 
     @model_validator(mode="after")
@@ -145,9 +139,7 @@ class AgentEntry(Careful):
 class RandomNetwork(Strict):
     """A random planar network, another one in each trial."""
 
-    intersections: Annotated[int, Field(ge=2, le=MOST_INTERSECTIONS)] = Field(
-        description="number of intersections N"
-    )
+    intersections: Annotated[int, Field(ge=2, le=MOST_INTERSECTIONS)] = Field(description="number of intersections N")
     segments: Annotated[int, Field(ge=1, le=2 * MOST_INTERSECTIONS)] = Field(
         description="number of segments, N - 1 up to floor(2N - 2 sqrt N)"
     )
@@ -232,9 +224,7 @@ class Settings0(Open):
         default=[], alias="e-agents", max_length=limits.CARS, description="the e-agents"
     )
     number_trials: TrialCount = Field(default=1, description="number of trials")
-    duration_bounds: DurationBounds = Field(
-        default=[30, 90], description="[low, high], whole seconds, both included"
-    )
+    duration_bounds: DurationBounds = Field(default=[30, 90], description="[low, high], whole seconds, both included")
     number_goals_bounds: GoalBounds = Field(default=[1, 4], description="[low, high], both included")
 
 
@@ -244,26 +234,20 @@ VERSION_0_KEYS = frozenset(info.alias or name for name, info in Settings0.model_
 class World(Careful):
     """What configurations and instances of version 1 say alike."""
 
-    e_agents: list[AgentEntry] = Field(
-        default=[], alias="e-agents", max_length=limits.CARS, description="the e-agents"
-    )
+    e_agents: list[AgentEntry] = Field(default=[], alias="e-agents", max_length=limits.CARS, description="the e-agents")
     intersection_radius: Length | None = Field(default=None, description="R, m; left out: 1.0 m * w / 0.3 m")
     car: CarModel = Field(default=CarModel(), description="the car; all cars are alike")
     rate: Annotated[float, Field(gt=0, le=limits.RATE)] = Field(default=30.0, description="control rate, Hz")
     sensing_radius: Length = Field(default=5.0, description="distance within which other cars are seen, m")
     laser: LaserSwitch = Field(default=None, description="laser; true: the layout of 2016")
-    obstacles: list[ObstacleModel] = Field(
-        default=[], max_length=limits.OBSTACLES, description="static obstacles"
-    )
+    obstacles: list[ObstacleModel] = Field(default=[], max_length=limits.OBSTACLES, description="static obstacles")
     disturbances: Disturbances = Field(default=Disturbances(), description="seeded disturbances")
     end_on_collision: bool = Field(default=False, description="whether a collision of the ego ends the trial")
     rules: Rules = Field(default=None, description="rules to judge; true: with all defaults")
     formulas: Formulas = Field(
         default={}, description="formulas to judge beside the task, by name: temporal logic over propositions"
     )
-    simulator: Annotated[str, Field(min_length=1)] = Field(
-        default="embedded", description="name of the simulator"
-    )
+    simulator: Annotated[str, Field(min_length=1)] = Field(default="embedded", description="name of the simulator")
 
     @model_validator(mode="after")
     def _bounded(self) -> World:
@@ -303,12 +287,8 @@ class Settings(World):
         default=None, description="the network of each trial, or the file of one, instead of rnd"
     )
     number_trials: TrialCount = Field(default=1, description="number of trials")
-    duration: Seconds | None = Field(
-        default=None, description="duration of every trial, s, instead of duration_bounds"
-    )
-    duration_bounds: DurationBounds = Field(
-        default=[30, 90], description="[low, high], whole seconds, both included"
-    )
+    duration: Seconds | None = Field(default=None, description="duration of every trial, s, instead of duration_bounds")
+    duration_bounds: DurationBounds = Field(default=[30, 90], description="[low, high], whole seconds, both included")
     goals: Goals | None = Field(
         default=None,
         description="goals of every trial, lattice points [x, y], instead of number_goals_bounds",
@@ -357,15 +337,11 @@ class InstanceModel(World):
         default={},
         description="start of each car by name: [x, y, cos, sin] or [x, y, theta]; left out: drawn",
     )
-    duration: Seconds | None = Field(
-        default=None, description="duration, s; left out: drawn, 30 to 90 whole seconds"
-    )
+    duration: Seconds | None = Field(default=None, description="duration, s; left out: drawn, 30 to 90 whole seconds")
     seed: Annotated[int, Field(ge=0, lt=limits.SEEDS)] | None = Field(
         default=None, description="seed of all random numbers"
     )
-    trial: Annotated[int, Field(ge=0, lt=limits.TRIALS)] | None = Field(
-        default=None, description="number of the trial"
-    )
+    trial: Annotated[int, Field(ge=0, lt=limits.TRIALS)] | None = Field(default=None, description="number of the trial")
 
     @model_validator(mode="after")
     def _consistent(self) -> InstanceModel:

@@ -143,11 +143,11 @@ class Places:
         x, y = shape.corners[0]
         reach = max(abs(p - x) + abs(q - y) for p, q in shape.corners)
         index = self._around(x, y, reach + radius)
-        own = self._free.select(index)
+        intervals = self._free.select(index)
         for a, b in edges(shape):
-            own = _cut(own, *self._stadium(own.lane, a, b, radius))
-        outside = [not contains(shape, point) for point in self._middles(own)]
-        self._put(index, own.select(np.flatnonzero(np.array(outside, dtype=np.bool_))))
+            intervals = _cut(intervals, *self._stadium(intervals.lane, a, b, radius))
+        outside = [not contains(shape, point) for point in self._middles(intervals)]
+        self._put(index, intervals.select(np.flatnonzero(np.array(outside, dtype=np.bool_))))
 
     def block_intersections(self, radius: float) -> None:
         """Remove all places closer than `radius` to an intersection."""
@@ -184,8 +184,8 @@ class Places:
         low = np.insert(rest.low, place, new.low).astype(np.float64)
         self._free = Intervals(lane, low, np.insert(rest.high, place, new.high).astype(np.float64))
 
-    def _middles(self, own: Intervals) -> list[Point]:
-        x, y = self._lines.points(own.lane, 0.5 * (own.low + own.high))
+    def _middles(self, intervals: Intervals) -> list[Point]:
+        x, y = self._lines.points(intervals.lane, 0.5 * (intervals.low + intervals.high))
         return list(zip(x.tolist(), y.tolist(), strict=True))
 
     def _stadium(self, lane: Ints, a: Point, b: Point, radius: float) -> tuple[Floats, Floats]:
@@ -247,30 +247,32 @@ class _Near:
         return self._cells
 
 
-def _cut(own: Intervals, low: Floats, high: Floats) -> Intervals:
+def _cut(intervals: Intervals, low: Floats, high: Floats) -> Intervals:
     """Take the open interval (low, high) out of each interval."""
-    hit = (low < own.high) & (high > own.low) & (low < high)
+    hit = (low < intervals.high) & (high > intervals.low) & (low < high)
     if not bool(np.any(hit)):
-        return own
-    before = np.flatnonzero(hit & (low >= own.low))
-    after = np.flatnonzero(hit & (high <= own.high))
-    kept = own.select(np.flatnonzero(~hit))
-    lane = np.concatenate([kept.lane, own.lane[before], own.lane[after]])
-    new_low = np.concatenate([kept.low, own.low[before], high[after]])
-    new_high = np.concatenate([kept.high, low[before], own.high[after]])
+        return intervals
+    before = np.flatnonzero(hit & (low >= intervals.low))
+    after = np.flatnonzero(hit & (high <= intervals.high))
+    kept = intervals.select(np.flatnonzero(~hit))
+    lane = np.concatenate([kept.lane, intervals.lane[before], intervals.lane[after]])
+    new_low = np.concatenate([kept.low, intervals.low[before], high[after]])
+    new_high = np.concatenate([kept.high, low[before], intervals.high[after]])
     return Intervals(lane, new_low, new_high).select(np.lexsort((new_low, lane)))
 
 
-def _subtract(own: Intervals, blocked: Intervals) -> Intervals:
-    """Take all of `blocked` out of `own` at once: what is left are the gaps of all that is not free."""
-    first = np.flatnonzero(np.diff(own.lane, prepend=-1))
-    last = np.flatnonzero(np.diff(own.lane, append=-1))
-    joints = np.flatnonzero(np.diff(own.lane, append=-1) == 0)
-    taken = np.isin(blocked.lane, own.lane)
-    lane = np.concatenate([blocked.lane[taken], own.lane[first], own.lane[last], own.lane[joints]])
-    low = np.concatenate([blocked.low[taken], np.full(len(first), -np.inf), own.high[last], own.high[joints]])
+def _subtract(intervals: Intervals, blocked: Intervals) -> Intervals:
+    """Take all of `blocked` out of `intervals` at once: what is left are the gaps of all that is not free."""
+    first = np.flatnonzero(np.diff(intervals.lane, prepend=-1))
+    last = np.flatnonzero(np.diff(intervals.lane, append=-1))
+    joints = np.flatnonzero(np.diff(intervals.lane, append=-1) == 0)
+    taken = np.isin(blocked.lane, intervals.lane)
+    lane = np.concatenate([blocked.lane[taken], intervals.lane[first], intervals.lane[last], intervals.lane[joints]])
+    low = np.concatenate(
+        [blocked.low[taken], np.full(len(first), -np.inf), intervals.high[last], intervals.high[joints]]
+    )
     high = np.concatenate(
-        [blocked.high[taken], own.low[first], np.full(len(last), np.inf), own.low[joints + 1]]
+        [blocked.high[taken], intervals.low[first], np.full(len(last), np.inf), intervals.low[joints + 1]]
     )
     order = np.lexsort((low, lane))
     lane, low, high = lane[order], low[order], high[order]
@@ -365,12 +367,12 @@ def lots(car: Car, areas: Sequence[Places], wishes: Sequence[Wish], gap: float =
     choosy = any(wish.lanes is not None for wish in wishes)
     allowed = np.ones((len(order), len(line)) if choosy else (0, 0), dtype=np.bool_)
     for k, n in enumerate(order):
-        own = wishes[n].lanes
-        if own is not None:
+        lanes = wishes[n].lanes
+        if lanes is not None:
             allowed[k] = False
-            allowed[k, list(own)] = True
-    lane, low, high = (np.concatenate(columns) for columns in zip(*(own for _, own in free), strict=True))
-    first = np.cumsum([0, *(len(own.lane) for _, own in free)]).astype(np.int64)
+            allowed[k, list(lanes)] = True
+    lane, low, high = (np.concatenate(columns) for columns in zip(*(intervals for _, intervals in free), strict=True))
+    first = np.cumsum([0, *(len(intervals.lane) for _, intervals in free)]).astype(np.int64)
     positions = np.array(given, dtype=np.float64).reshape(len(given), 2)
     radius = gap_radius(car, gap) + SLACK
     return Lots(line, lane, low, high, first, positions, np.array(order, dtype=np.int64), allowed, radius)
@@ -394,19 +396,19 @@ def draw_starts(areas: Areas, car: Car, wishes: Sequence[Wish], draws: Draws) ->
     free, outside = areas
     best = 0
     for some, gap in (((outside,), ROOMY), ((outside,), TIGHT), ((outside, free), TIGHT)):
-        own = lots(car, some, wishes, gap)
-        count = len(own.order)
+        lots_here = lots(car, some, wishes, gap)
+        count = len(lots_here.order)
         for packed in (False, True):
-            ranks = np.array(draws.shuffled(len(own.line)) if packed else (), dtype=np.int64)
+            ranks = np.array(draws.shuffled(len(lots_here.line)) if packed else (), dtype=np.int64)
             ahead = deepcopy(draws)
             shares = np.array([[0.0 if packed else ahead.uniform() for _ in range(count)]])
-            rows, placed = _place(own, shares, ranks)
+            rows, placed = _place(lots_here, shares, ranks)
             done = int(placed[0])
             if done == count:
-                return _starts(own, wishes, rows[0])
+                return _starts(lots_here, wishes, rows[0])
             for _ in range(0 if packed else done):
                 draws.uniform()
-            best = max(best, len(own.given) + done)
+            best = max(best, len(lots_here.given) + done)
     raise InputError(
         f"only {best} of {len(wishes)} cars fit on the road network",
         field="e-agents",
@@ -416,35 +418,35 @@ def draw_starts(areas: Areas, car: Car, wishes: Sequence[Wish], draws: Draws) ->
 
 
 def place_cars(
-    own: Lots, wishes: Sequence[Wish], seed: int, trials: Sequence[int], stream: int
+    lots: Lots, wishes: Sequence[Wish], seed: int, trials: Sequence[int], stream: int
 ) -> list[list[Pose] | None]:
     """Return the start poses that `draw_starts` draws for each trial; None where it has to try more than once."""
-    shares = np.zeros((len(trials), len(own.order)))
+    shares = np.zeros((len(trials), len(lots.order)))
     draw_shares(np.uint64(seed), np.array(trials, dtype=np.int64), stream, shares)
-    poses, placed = _place(own, shares, np.zeros(0, dtype=np.int64))
+    poses, placed = _place(lots, shares, np.zeros(0, dtype=np.int64))
     return [
-        _starts(own, wishes, rows) if done == len(own.order) else None
+        _starts(lots, wishes, rows) if done == len(lots.order) else None
         for rows, done in zip(poses, placed.tolist(), strict=True)
     ]
 
 
-def _starts(own: Lots, wishes: Sequence[Wish], rows: Floats) -> list[Pose]:
+def _starts(lots: Lots, wishes: Sequence[Wish], rows: Floats) -> list[Pose]:
     """Return the poses of all cars: as given, and as drawn."""
     whole = [wish.pose for wish in wishes]
-    for n, row in zip(own.order.tolist(), rows.tolist(), strict=True):
+    for n, row in zip(lots.order.tolist(), rows.tolist(), strict=True):
         whole[n] = Pose._make(row)
     return [pose for pose in whole if pose is not None]
 
 
-def _place(own: Lots, shares: Floats, ranks: Ints) -> tuple[Floats, Ints]:
+def _place(lots: Lots, shares: Floats, ranks: Ints) -> tuple[Floats, Ints]:
     """Return what `place_trials` writes; a trial alone gets the scratch that it needs, of many some may go without."""
     trials, cars = shares.shape
     poses, placed = np.zeros((trials, cars, 4)), np.zeros(trials, dtype=np.int64)
-    areas, size = len(own.first) - 1, len(own.lane) + CUTS * (cars + len(own.given))
+    areas, size = len(lots.first) - 1, len(lots.lane) + CUTS * (cars + len(lots.given))
     while True:
         lane, span = np.zeros((areas, 2, size), dtype=np.int64), np.zeros((areas, 2, size, 2))
         room = Room(lane, span, np.zeros(areas, dtype=np.int64), np.zeros(size))
-        place_trials(own, shares, ranks, room, poses, placed)
+        place_trials(lots, shares, ranks, room, poses, placed)
         if trials != 1 or placed[0] >= 0:
             return poses, placed
         size *= 2
@@ -474,12 +476,12 @@ def draw_shares(seed: np.uint64, trials: Ints, stream: int, shares: Floats) -> N
 
 
 @jit
-def place_trials(own: Lots, shares: Floats, ranks: Ints, room: Room, poses: Floats, placed: Ints) -> None:
+def place_trials(lots: Lots, shares: Floats, ranks: Ints, room: Room, poses: Floats, placed: Ints) -> None:
     """Place the cars of all trials, one after another, each in the first area that has room, until one finds none.
 
     Parameters
     ----------
-    own : Lots
+    lots : Lots
         What the trials have in common.
     shares : (B, D) float64
         Where a car is to stand, as a share of all that is free then, a number in [0, 1).
@@ -492,19 +494,19 @@ def place_trials(own: Lots, shares: Floats, ranks: Ints, room: Room, poses: Floa
     placed : (B,) int64
         Set to the number of cars that have found a place, -1 if the scratch is too small to tell.
     """
-    cars = own.order.shape[0]
+    cars = lots.order.shape[0]
     for b in range(shares.shape[0]):
         for a in range(room.counts.shape[0]):
-            start = own.first[a]
-            room.counts[a] = own.first[a + 1] - start
+            start = lots.first[a]
+            room.counts[a] = lots.first[a + 1] - start
             for k in range(room.counts[a]):
-                room.lane[a, 0, k] = own.lane[start + k]
-                room.span[a, 0, k, 0] = own.low[start + k]
-                room.span[a, 0, k, 1] = own.high[start + k]
+                room.lane[a, 0, k] = lots.lane[start + k]
+                room.span[a, 0, k, 0] = lots.low[start + k]
+                room.span[a, 0, k, 1] = lots.high[start + k]
         side = 0
         done = 0
-        for g in range(own.given.shape[0]):
-            if done == 0 and not _cut_out(own, own.given[g, 0], own.given[g, 1], side, room):
+        for g in range(lots.given.shape[0]):
+            if done == 0 and not _cut_out(lots, lots.given[g, 0], lots.given[g, 1], side, room):
                 done = -1
             side = 1 - side
         placed[b] = done
@@ -514,27 +516,27 @@ def place_trials(own: Lots, shares: Floats, ranks: Ints, room: Room, poses: Floa
             while spot < 0 and area + 1 < room.counts.shape[0]:
                 area += 1
                 if ranks.shape[0] > 0:
-                    spot, along = _first(own, car, ranks, area, side, room)
+                    spot, along = _first(lots, car, ranks, area, side, room)
                 else:
-                    spot, along = _choose(own, car, shares[b, car], area, side, room)
+                    spot, along = _choose(lots, car, shares[b, car], area, side, room)
             if spot < 0:
                 break
-            line, pose = own.line[room.lane[area, side, spot]], poses[b, car]
+            line, pose = lots.line[room.lane[area, side, spot]], poses[b, car]
             pose[0], pose[1] = line[0] + along * line[2], line[1] + along * line[3]
             pose[2], pose[3] = line[2], line[3]
             placed[b] = car + 1
-            if car + 1 < cars and not _cut_out(own, pose[0], pose[1], side, room):
+            if car + 1 < cars and not _cut_out(lots, pose[0], pose[1], side, room):
                 placed[b] = -1
             side = 1 - side
 
 
 @jit
-def _first(own: Lots, car: int, ranks: Ints, area: int, side: int, room: Room) -> tuple[int, float]:
+def _first(lots: Lots, car: int, ranks: Ints, area: int, side: int, room: Room) -> tuple[int, float]:
     """Return the first interval of the lane of lowest rank that a car may take, and its beginning; -1 if none is."""
     best = -1
     for k in range(room.counts[area]):
         lane = room.lane[area, side, k]
-        if own.allowed.shape[0] > 0 and not own.allowed[car, lane]:
+        if lots.allowed.shape[0] > 0 and not lots.allowed[car, lane]:
             continue
         if best < 0 or ranks[lane] < ranks[room.lane[area, side, best]]:
             best = k
@@ -544,14 +546,14 @@ def _first(own: Lots, car: int, ranks: Ints, area: int, side: int, room: Room) -
 
 
 @jit
-def _choose(own: Lots, car: int, share: float, area: int, side: int, room: Room) -> tuple[int, float]:
+def _choose(lots: Lots, car: int, share: float, area: int, side: int, room: Room) -> tuple[int, float]:
     """Return an interval and the metres along its lane at a share of all that is free; -1 if nothing is."""
     lane, span, ends = room.lane[area, side], room.span[area, side], room.ends
     total = 0.0
     last = -1
     for k in range(room.counts[area]):
         width = span[k, 1] - span[k, 0]
-        if own.allowed.shape[0] > 0 and not own.allowed[car, lane[k]]:
+        if lots.allowed.shape[0] > 0 and not lots.allowed[car, lane[k]]:
             width = 0.0
         total += width
         ends[k] = total
@@ -566,16 +568,16 @@ def _choose(own: Lots, car: int, share: float, area: int, side: int, room: Room)
             chosen = k
             break
     width = span[chosen, 1] - span[chosen, 0]
-    if own.allowed.shape[0] > 0 and not own.allowed[car, lane[chosen]]:
+    if lots.allowed.shape[0] > 0 and not lots.allowed[car, lane[chosen]]:
         width = 0.0
     along = span[chosen, 0] + (pick - (ends[chosen] - width))
     return chosen, min(max(along, span[chosen, 0]), span[chosen, 1])
 
 
 @jit
-def _cut_out(own: Lots, x: float, y: float, side: int, room: Room) -> bool:
+def _cut_out(lots: Lots, x: float, y: float, side: int, room: Room) -> bool:
     """Take a disc out of the intervals of all areas; return whether the scratch was large enough."""
-    square = own.radius * own.radius
+    square = lots.radius * lots.radius
     for a in range(room.counts.shape[0]):
         lane, span = room.lane[a, side], room.span[a, side]
         new_lane, new_span = room.lane[a, 1 - side], room.span[a, 1 - side]
@@ -583,7 +585,7 @@ def _cut_out(own: Lots, x: float, y: float, side: int, room: Room) -> bool:
         for k in range(room.counts[a]):
             if total + 2 > new_lane.shape[0]:
                 return False
-            line = own.line[lane[k]]
+            line = lots.line[lane[k]]
             rx = x - line[0]
             ry = y - line[1]
             along = rx * line[2] + ry * line[3]

@@ -49,7 +49,10 @@ class TrialData(Open):
     def of(date: str, trialconf: Mapping[str, Any], instances: Sequence[Mapping[str, Any]]) -> TrialData:
         """Return trial data of documents."""
         return TrialData(
-            version=0, date=date, trialconf=dict(trialconf), instances=[dict(own) for own in instances]
+            version=0,
+            date=date,
+            trialconf=dict(trialconf),
+            instances=[dict(instance) for instance in instances],
         )
 
     @staticmethod

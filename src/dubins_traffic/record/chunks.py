@@ -101,9 +101,7 @@ def pieces(data: bytes, file: str | None = None) -> Iterator[Piece]:
 
 
 def _damaged(file: str | None, place: str | None, why: str) -> RecordError:
-    return RecordError(
-        f"damaged record ({why})", file=file, field=place, expected="a record as it was written"
-    )
+    return RecordError(f"damaged record ({why})", file=file, field=place, expected="a record as it was written")
 
 
 def _footer(data: bytes, file: str | None) -> _Footer | None:
@@ -201,7 +199,7 @@ def _content(body: bytes, topics: dict[int, str]) -> tuple[Entry, ...]:
     data = body[_CHUNK.size + _SIZE.size :]
     if len(data) != size or zlib.crc32(data) != checksum:
         raise _DamageError("it does not match its checksum")
-    found: list[Entry] = []
+    entries: list[Entry] = []
     at = 0
     while at < size:
         if at + _HEAD.size > size:
@@ -213,9 +211,9 @@ def _content(body: bytes, topics: dict[int, str]) -> tuple[Entry, ...]:
         if kind == Opcode.MESSAGE:
             channel, sequence, log_time, publish_time = _MESSAGE.unpack_from(data, at)
             content = data[at + _MESSAGE.size : at + length]
-            found.append(Entry(topics.get(channel, ""), content, log_time, publish_time, sequence))
+            entries.append(Entry(topics.get(channel, ""), content, log_time, publish_time, sequence))
         elif kind == Opcode.CHANNEL:
             number, _, text = struct.unpack_from("<HHI", data, at)
             topics[number] = data[at + 8 : at + 8 + text].decode()
         at += length
-    return tuple(found)
+    return tuple(entries)

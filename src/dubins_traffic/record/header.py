@@ -45,9 +45,7 @@ def as_message(document: Mapping[str, Any]) -> bytes:
     return json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False).encode()
 
 
-def document(
-    instance: Instance, controller: str | None, versions: Mapping[str, str] | None = None
-) -> dict[str, Any]:
+def document(instance: Instance, controller: str | None, versions: Mapping[str, str] | None = None) -> dict[str, Any]:
     """Return the document that `encode` encodes."""
     bounds = instance.problem.car.bounds
     if versions is None:
@@ -98,9 +96,7 @@ def decode(data: bytes, file: str | None = None) -> Header:
     for name, kind in (("package", str), ("libraries", dict), ("instance", dict), ("controller", str | None)):
         if name not in fields or not isinstance(fields[name], kind):
             value = fields.get(name)
-            raise RecordError(
-                "missing from the header or of a wrong type", file=file, field=name, value=value
-            )
+            raise RecordError("missing from the header or of a wrong type", file=file, field=name, value=value)
     try:
         instance = instance_from_document(fields["instance"])
     except InputError as error:

@@ -73,9 +73,7 @@ class McapFile:
         number = len(self._channels) + 1
         name, schema_encoding, data = schema
         self._schemas.append(Schema(id=number, name=name, encoding=schema_encoding, data=data))
-        self._channels.append(
-            Channel(id=number, topic=topic, message_encoding=encoding, metadata={}, schema_id=number)
-        )
+        self._channels.append(Channel(id=number, topic=topic, message_encoding=encoding, metadata={}, schema_id=number))
         return number
 
     def chunk(self, messages: Mapping[int, Sequence[Message]]) -> None:

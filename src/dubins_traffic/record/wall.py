@@ -94,22 +94,16 @@ def read(record: Path | str) -> Wall | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError, RecursionError) as error:
-        raise RecordError(
-            "can't be read as a sidecar of a record", file=str(path), expected="JSON"
-        ) from error
+        raise RecordError("can't be read as a sidecar of a record", file=str(path), expected="JSON") from error
     if not isinstance(document, dict):
         raise RecordError("not a sidecar of a record", file=str(path), expected="a JSON object")
     fields = cast("dict[str, Any]", document)
     if fields.pop("version", None) != VERSION:
-        raise RecordError(
-            "not a version of a sidecar", file=str(path), field="version", expected=str(VERSION)
-        )
+        raise RecordError("not a version of a sidecar", file=str(path), field="version", expected=str(VERSION))
     for name, value in fields.items():
         rule = _TYPES.get(name)
         if rule is not None and not rule[0](value):
-            raise RecordError(
-                "not a sidecar of a record", file=str(path), field=name, value=value, expected=rule[1]
-            )
+            raise RecordError("not a sidecar of a record", file=str(path), field=name, value=value, expected=rule[1])
     try:
         return Wall(**fields)
     except TypeError as error:

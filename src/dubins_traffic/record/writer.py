@@ -126,9 +126,7 @@ class RecordWriter:
         """
         twin = RecordWriter(path, controller=self._controller, overwrite=overwrite)
         if twin.path.exists() and self.path.exists() and twin.path.samefile(self.path):
-            raise InputError(
-                "is the record of the trial that is forked", file=str(path), expected="another file"
-            )
+            raise InputError("is the record of the trial that is forked", file=str(path), expected="another file")
         with self._written():
             before = self.path.open("rb")
         with before:

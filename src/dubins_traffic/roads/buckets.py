@@ -20,13 +20,13 @@ def buckets(items: int) -> Rows[Bucket]:
 
 
 @jit
-def bucket_of(own: Rows[Bucket], column: int, row: int) -> int:
+def bucket_of(buckets: Rows[Bucket], column: int, row: int) -> int:
     """Return the number of the bucket that holds what is in a cell, its `column` (number) and `row` (number)."""
-    return (column * 73_856_093 ^ row * 19_349_663) & (own.shape[0] - 1)
+    return (column * 73_856_093 ^ row * 19_349_663) & (buckets.shape[0] - 1)
 
 
 @jit
-def empty(own: Rows[Bucket]) -> None:
+def empty(buckets: Rows[Bucket]) -> None:
     """Take all items out of the buckets."""
-    for k in range(own.shape[0]):
-        own[k].first = -1
+    for k in range(buckets.shape[0]):
+        buckets[k].first = -1

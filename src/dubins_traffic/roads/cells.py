@@ -39,9 +39,7 @@ class Sieve(Tables):
 
 def with_cells(rows: RoadTable, half_widths: Sequence[float]) -> RoadTable:
     """Return a table of networks with the widths of their roads, metres to either side, and with their cells."""
-    t = rows.replace(
-        half_width=np.array(half_widths, dtype=np.float64), grid=table(CellGrid, len(half_widths))
-    )
+    t = rows.replace(half_width=np.array(half_widths, dtype=np.float64), grid=table(CellGrid, len(half_widths)))
     set_grids(t)
     columns, lines = t.grid["nx"], t.grid["ny"]
     count = max(int(np.diff(off).max()) for off in (t.seg_off, t.vert_off))
@@ -54,9 +52,7 @@ def with_cells(rows: RoadTable, half_widths: Sequence[float]) -> RoadTable:
         item = np.zeros(total, dtype=np.int64)
     (seg_start, seg_item), (vert_start, vert_item) = (_in_order(item, *kind.T) for kind in spans)
     pave = np.full(int(np.dot(t.grid["pave_nx"], t.grid["pave_ny"])), CELL.OFF, dtype=np.int64)
-    found = t.replace(
-        seg_start=seg_start, seg_item=seg_item, vert_start=vert_start, vert_item=vert_item, pave=pave
-    )
+    found = t.replace(seg_start=seg_start, seg_item=seg_item, vert_start=vert_start, vert_item=vert_item, pave=pave)
     cover(found)
     return found
 
@@ -81,9 +77,9 @@ def set_grids(t: RoadTable) -> None:
             x0, y0, x1, y1 = min(x0, at.x), min(y0, at.y), max(x1, at.x), max(y1, at.y)
         length = 0.0
         for s in range(t.seg_off[net], t.seg_off[net + 1]):
-            own = t.segment[s]
-            length += own.length
-            for k in range(max(own.piece, 0), own.last + 1):
+            segment = t.segment[s]
+            length += segment.length
+            for k in range(max(segment.piece, 0), segment.last + 1):
                 end = t.piece[k]
                 x0, y0, x1, y1 = min(x0, end.x), min(y0, end.y), max(x1, end.x), max(y1, end.y)
         margin = 0.5 * length / roads
@@ -110,14 +106,14 @@ def slack(grid: CellGrid) -> float:
 
 
 @jit
-def sieve(t: RoadTable, own: Sieve, spans: Ints, item: Ints) -> int:
+def sieve(t: RoadTable, scratch: Sieve, spans: Ints, item: Ints) -> int:
     """Find what may be nearest somewhere in each cell, segments and intersections, and return how many that are.
 
     Parameters
     ----------
     t : RoadTable
         The networks, with grids.
-    own : Sieve
+    scratch : Sieve
         Scratch.
     spans : (2, C, 2) int64
         Set, for each cell, to where its segments begin in `item`, and how many they are; then the same of
@@ -133,11 +129,11 @@ def sieve(t: RoadTable, own: Sieve, spans: Ints, item: Ints) -> int:
             while max(grid.nx, grid.ny) > 1 << (top - 1):
                 top += 1
             off = t.vert_off if kind else t.seg_off
-            own.filled[top] = off[net + 1] - off[net]
-            for k in range(own.filled[top]):
-                own.item[top, k] = k
+            scratch.filled[top] = off[net + 1] - off[net]
+            for k in range(scratch.filled[top]):
+                scratch.item[top, k] = k
             for level in range(top):
-                own.column[level] = -1
+                scratch.column[level] = -1
             for code in range(1 << (2 * (top - 1))):
                 column, row = 0, 0
                 for bit in range(top - 1):
@@ -146,21 +142,21 @@ def sieve(t: RoadTable, own: Sieve, spans: Ints, item: Ints) -> int:
                 if column >= grid.nx or row >= grid.ny:
                     continue
                 for level in range(top - 1, -1, -1):
-                    if own.column[level] != column >> level or own.row[level] != row >> level:
-                        own.column[level] = column >> level
-                        own.row[level] = row >> level
-                        _sift(t, net, kind == 1, level, own)
+                    if scratch.column[level] != column >> level or scratch.row[level] != row >> level:
+                        scratch.column[level] = column >> level
+                        scratch.row[level] = row >> level
+                        _sift(t, net, kind == 1, level, scratch)
                 number = grid.first + row * grid.nx + column
                 spans[kind, number, 0] = total
-                spans[kind, number, 1] = own.filled[0]
-                for k in range(min(own.filled[0], item.shape[0] - total)):
-                    item[total + k] = own.item[0, k]
-                total += own.filled[0]
+                spans[kind, number, 1] = scratch.filled[0]
+                for k in range(min(scratch.filled[0], item.shape[0] - total)):
+                    item[total + k] = scratch.item[0, k]
+                total += scratch.filled[0]
     return total
 
 
 @jit
-def _sift(t: RoadTable, net: int, vertices: bool, level: int, own: Sieve) -> None:
+def _sift(t: RoadTable, net: int, vertices: bool, level: int, scratch: Sieve) -> None:
     """Keep, of the items of the square around it, what may be nearest somewhere in the square of a `level` (number).
 
     `vertices` (flag) instead of segments, of network `net` (number). Of half diagonal h and with least distance d from
@@ -168,19 +164,19 @@ def _sift(t: RoadTable, net: int, vertices: bool, level: int, own: Sieve) -> Non
     """
     grid = t.grid[net]
     side = (1 << level) / grid.scale
-    x = grid.x0 + (own.column[level] + 0.5) * side
-    y = grid.y0 + (own.row[level] + 0.5) * side
+    x = grid.x0 + (scratch.column[level] + 0.5) * side
+    y = grid.y0 + (scratch.row[level] + 0.5) * side
     least = INFINITE
-    for k in range(own.filled[level + 1]):
-        n = own.item[level + 1, k]
-        own.far[k] = sqrt(vertex_distance2(t, net, n, x, y) if vertices else distance2(t, net, n, x, y))
-        least = min(least, own.far[k])
+    for k in range(scratch.filled[level + 1]):
+        n = scratch.item[level + 1, k]
+        scratch.far[k] = sqrt(vertex_distance2(t, net, n, x, y) if vertices else distance2(t, net, n, x, y))
+        least = min(least, scratch.far[k])
     most, filled = least + (DIAGONAL * side + slack(grid)), 0
-    for k in range(own.filled[level + 1]):
-        if own.far[k] <= most:
-            own.item[level, filled] = own.item[level + 1, k]
+    for k in range(scratch.filled[level + 1]):
+        if scratch.far[k] <= most:
+            scratch.item[level, filled] = scratch.item[level + 1, k]
             filled += 1
-    own.filled[level] = filled
+    scratch.filled[level] = filled
 
 
 @jit
@@ -193,9 +189,9 @@ def cover(t: RoadTable) -> None:
         side = 1.0 / grid.pave_scale
         reach = 0.5 * DIAGONAL * side + half * 1e-9 + slack(grid)
         for row in range(t.seg_off[net], t.seg_off[net + 1]):
-            own = t.segment[row]
-            for k in range(own.piece, own.last + 1):
-                ax, ay, bx, by, pad = own.x, own.y, own.end_x, own.end_y, half + reach
+            segment = t.segment[row]
+            for k in range(segment.piece, segment.last + 1):
+                ax, ay, bx, by, pad = segment.x, segment.y, segment.end_x, segment.end_y, half + reach
                 if k >= 0:
                     at = t.piece[k]
                     ax, ay, bx, by = at.x, at.y, at.end_x, at.end_y

@@ -195,9 +195,9 @@ class Chains:
         transform: tuple[float, float, float],
     ) -> None:
         given = pieces(segments, corners)
-        self.first: Ints = np.concatenate([[0], np.cumsum([len(own) for own in given])]).astype(np.int64)
+        self.first: Ints = np.concatenate([[0], np.cumsum([len(pieces) for pieces in given])]).astype(np.int64)
         self.owner: Ints = np.repeat(np.arange(len(given)), np.diff(self.first))
-        rows = np.array([piece for own in given for piece in own], dtype=np.float64)
+        rows = np.array([piece for pieces in given for piece in pieces], dtype=np.float64)
         rows = rows.reshape(-1, len(Piece._fields))
         tx, ty, theta = transform
         turn, shift = sincos(theta), np.array([tx, ty])
@@ -235,8 +235,8 @@ class Chains:
         """Return the longest line of each segment; `straight` has those of the segments that do not bend."""
         start, end, tangent, length = (each.copy() for each in straight)
         for s in np.unique(self.owner).tolist():
-            own = np.arange(int(self.first[s]), int(self.first[s + 1]))
-            k = own[np.argmax(np.where(self.side[own] == 0.0, self.length[own], 0.0))]
+            pieces = np.arange(int(self.first[s]), int(self.first[s + 1]))
+            k = pieces[np.argmax(np.where(self.side[pieces] == 0.0, self.length[pieces], 0.0))]
             start[s], end[s], tangent[s], length[s] = (
                 self.start[k],
                 self.end[k],
@@ -247,8 +247,8 @@ class Chains:
 
     def places(self, s: int, along: Floats) -> tuple[Floats, Floats]:
         """Return points (N, 2) of chain s and the unit vectors (N, 2) along it, so many metres from its start."""
-        own: Ints = np.arange(int(self.first[s]), int(self.first[s + 1]))
-        k: Ints = own[np.clip(np.searchsorted(self.base[own], along, side="right") - 1, 0, len(own) - 1)]
+        pieces: Ints = np.arange(int(self.first[s]), int(self.first[s + 1]))
+        k: Ints = pieces[np.clip(np.searchsorted(self.base[pieces], along, side="right") - 1, 0, len(pieces) - 1)]
         gone = along - self.base[k]
         tangent, side, radius = self.tangent[k], self.side[k], self.radius[k]
         bent = side != 0.0
@@ -282,9 +282,9 @@ def pieces(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> 
     """Return the pieces of each segment that bends, none for the others; an InputError names segment and corner."""
     found: list[tuple[Piece, ...]] = []
     for s, (x0, y0, x1, y1) in enumerate(segments):
-        own = corners[s] if corners else ()
+        bends = corners[s] if corners else ()
         try:
-            found.append(chain((x0, y0), own, (x1, y1)) if own else ())
+            found.append(chain((x0, y0), bends, (x1, y1)) if bends else ())
         except InputError as error:
             raise error.within(field=f"segments[{s}]") from None
     return found
@@ -294,8 +294,8 @@ def sides(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> l
     """Return the first and the last side of each segment's polygon: (dx, dy, dx, dy)."""
     found: list[Segment] = []
     for s, (x0, y0, x1, y1) in enumerate(segments):
-        own = corners[s] if corners else ()
-        (ax, ay), (bx, by) = (own[0][:2], own[-1][:2]) if own else ((x1, y1), (x0, y0))
+        bends = corners[s] if corners else ()
+        (ax, ay), (bx, by) = (bends[0][:2], bends[-1][:2]) if bends else ((x1, y1), (x0, y0))
         found.append((ax - x0, ay - y0, x1 - bx, y1 - by))
     return found
 

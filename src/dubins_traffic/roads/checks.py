@@ -61,9 +61,9 @@ def _check_each(segments: Sequence[Segment]) -> None:
 
 def meetings(segment: Ints) -> Ints:
     """Return the pairs (K, 2) of segments (S, 4) that meet elsewhere than at a common end; the lower number first."""
-    own = finder(0, len(segment), 0)
-    own.put_bars(segment[:, :2].astype(np.float64), segment[:, 2:].astype(np.float64))
-    found = own.meetings()[:, 2:]
+    search = finder(0, len(segment), 0)
+    search.put_bars(segment[:, :2].astype(np.float64), segment[:, 2:].astype(np.float64))
+    found = search.meetings()[:, 2:]
     return found[np.lexsort((found[:, 1], found[:, 0]))]
 
 
@@ -135,9 +135,9 @@ def first_crossing(segments: Sequence[Segment], corners: Sequence[Corners]) -> t
         If the arcs of a segment do not fit: it names segment and corner.
     """
     bent = pieces(segments, corners)
-    chains = [own or chain(row[:2], (), row[2:]) for own, row in zip(bent, segments, strict=True)]
-    owner = [s for s, own in enumerate(chains) for _ in own]
-    rows = [piece for own in chains for piece in own]
+    chains = [bend or chain(row[:2], (), row[2:]) for bend, row in zip(bent, segments, strict=True)]
+    owner = [s for s, chain in enumerate(chains) for _ in chain]
+    rows = [piece for chain in chains for piece in chain]
     shared = [frozenset(((row[0], row[1]), (row[2], row[3]))) for row in segments]
     found: list[tuple[int, int]] = []
     for i, j in _candidates(rows):

@@ -54,26 +54,26 @@ def tight(points: Floats, ends: Ints, least: Clearances) -> Tight:
 
 def bent_tight(network: RoadNetwork, least: Clearances) -> Tight:
     """Return the places where a network whose segments bend falls short of `least`."""
-    own = _finder(network.points, network.ends, network.bars(STRAIGHTENED))
+    search = _finder(network.points, network.ends, network.bars(STRAIGHTENED))
     hub = np.concatenate([network.ends[:, 0], network.ends[:, 1]])
     step = np.concatenate([network.tangents, -network.end_tangents])
     order = np.argsort(hub, kind="stable")
-    arm = own.frame.arm
+    arm = search.frame.arm
     arm["hub"], arm["segment"] = hub[order], order % max(len(network.ends), 1)
     arm["dx"], arm["dy"] = (step / _norm(step)[:, None])[order].T
     short = np.flatnonzero(network.lengths < least.length - ROUNDING)
-    return _told(own.crowded_and_sharp(least))._replace(short=short)
+    return _told(search.crowded_and_sharp(least))._replace(short=short)
 
 
 def _finder(points: Floats, ends: Ints, bars: Bars) -> Finder:
     """Return what finds what falls short in a network of which the `bars` are the roads."""
-    own = finder(len(points), len(bars.owner), 2 * len(ends))
-    node, bar = own.frame.node, own.frame.bar
+    search = finder(len(points), len(bars.owner), 2 * len(ends))
+    node, bar = search.frame.node, search.frame.bar
     node["x"], node["y"] = points.T
-    own.put_bars(bars.start, bars.end)
+    search.put_bars(bars.start, bars.end)
     bar["owner"] = bars.owner
     bar["a"], bar["b"] = ends[bars.owner].T
-    return own
+    return search
 
 
 def _told(found: Ints) -> Tight:
@@ -117,9 +117,7 @@ def clearance_faults(
         if faults:
             return faults
     if least not in network.known:
-        network.known[least] = (
-            tight(points, ends, least) if network.is_straight else bent_tight(network, least)
-        )
+        network.known[least] = tight(points, ends, least) if network.is_straight else bent_tight(network, least)
     found = cast(Tight, network.known[least])
     for s in found.short.tolist():
         faults.append(_fault("too short", s, float(network.lengths[s]), f"at least {least.length:.6g} m"))
@@ -158,9 +156,7 @@ def _sharp_fault(network: RoadNetwork, v: int, first: int, second: int, cosine: 
     )
 
 
-def curve_faults(
-    network: RoadNetwork, radius: float, reach: float, w: float, slack: float
-) -> list[InputError]:
+def curve_faults(network: RoadNetwork, radius: float, reach: float, w: float, slack: float) -> list[InputError]:
     """Return where segments that bend are not straight near their ends, too sharp, or too close to others.
 
     Parameters are those of `roads.clearance.clearance_faults`.
@@ -171,8 +167,8 @@ def curve_faults(
     faults: list[InputError] = []
     straight = radius + reach + slack
     for s in np.flatnonzero(network.bent).tolist():
-        own = slice(int(chains.first[s]), int(chains.first[s + 1]))
-        for which, k in (("first", own.start), ("second", own.stop - 1)):
+        pieces = slice(int(chains.first[s]), int(chains.first[s + 1]))
+        for which, k in (("first", pieces.start), ("second", pieces.stop - 1)):
             if chains.length[k] < straight - ROUNDING:
                 corner = 0 if which == "first" else len(network.corners[s]) - 1
                 problem = f"corner {corner}: too near to the {which} end"
@@ -207,9 +203,7 @@ def _overlaps(network: RoadNetwork, straight: float, least: float, w: float) -> 
     for low, high in sorted(found, key=lambda pair: (pair[1], pair[0])):
         s, other = (high, low) if network.bent[high] else (low, high)
         problem = "comes too close to itself" if s == other else f"comes too close to segments[{other}]"
-        faults.append(
-            _fault(problem, s, found[low, high], f"at least {least:.6g} m between the middles of roads")
-        )
+        faults.append(_fault(problem, s, found[low, high], f"at least {least:.6g} m between the middles of roads"))
     return faults
 
 
@@ -221,13 +215,13 @@ def _samples(network: RoadNetwork, straight: float, apart: float) -> tuple[Ints,
     for s, length in enumerate(network.lengths.tolist()):
         count = int(max(length - 2.0 * straight, 0.0) / apart) + 2
         low, high = min(straight, 0.5 * length), max(length - straight, 0.5 * length)
-        own = cast(Floats, np.linspace(low, high, count))
+        shares = cast(Floats, np.linspace(low, high, count))
         if network.bent[s]:
-            spots, _ = network.chains.places(s, own)
+            spots, _ = network.chains.places(s, shares)
         else:
-            spots = cast(Floats, network.points[network.ends[s, 0]] + own[:, None] * network.tangents[s])
+            spots = cast(Floats, network.points[network.ends[s, 0]] + shares[:, None] * network.tangents[s])
         owner.append(np.full(count, s))
-        along.append(own)
+        along.append(shares)
         place.append(spots)
     return np.concatenate(owner), np.concatenate(along), np.concatenate(place)
 

@@ -195,16 +195,16 @@ def _finder(nodes: int, bars: int, arms: int, _thread: int) -> Finder:
 
 
 @jit
-def _note(own: Hits, vertex: int, other_vertex: int, segment: int, other_segment: int) -> None:
+def _note(hits: Hits, vertex: int, other_vertex: int, segment: int, other_segment: int) -> None:
     """Note what falls short, as `Hit` has it, if there is room, and count it."""
-    count = int(own.filled[0])
-    if count < own.row.shape[0]:
-        hit = own.row[count]
+    count = int(hits.filled[0])
+    if count < hits.row.shape[0]:
+        hit = hits.row[count]
         hit.vertex = vertex
         hit.other_vertex = other_vertex
         hit.segment = segment
         hit.other_segment = other_segment
-    own.filled[0] = count + 1
+    hits.filled[0] = count + 1
 
 
 @jit
@@ -214,74 +214,74 @@ def norm(x: float, y: float) -> float:
 
 
 @jit
-def find_tight(own: Frame, least: Clearances, found: Hits) -> None:
+def find_tight(frame: Frame, least: Clearances, hits: Hits) -> None:
     """Note what falls short of `least` in a network whose arms are in order: `find_short` to `find_sharp`."""
-    find_short(own, least, found)
-    find_crowded(own, least, found)
-    find_sharp(own, least, found)
+    find_short(frame, least, hits)
+    find_crowded(frame, least, hits)
+    find_sharp(frame, least, hits)
 
 
 @jit
-def find_short(own: Frame, least: Clearances, found: Hits) -> None:
+def find_short(frame: Frame, least: Clearances, hits: Hits) -> None:
     """Note the pieces that are too short."""
-    for k in range(own.bar.shape[0]):
-        bar = own.bar[k]
+    for k in range(frame.bar.shape[0]):
+        bar = frame.bar[k]
         if norm(bar.x1 - bar.x0, bar.y1 - bar.y0) < least.length - ROUNDING:
-            _note(found, -1, -1, bar.owner, -1)
+            _note(hits, -1, -1, bar.owner, -1)
 
 
 @jit
-def find_crowded(own: Frame, least: Clearances, found: Hits) -> None:
+def find_crowded(frame: Frame, least: Clearances, hits: Hits) -> None:
     """Note the pairs of intersections that are too close, and of intersections and roads beside them."""
-    _file(own, max(least.apart, least.aside))
-    for v in range(own.node.shape[0]):
-        node = own.node[v]
+    _file(frame, max(least.apart, least.aside))
+    for v in range(frame.node.shape[0]):
+        node = frame.node[v]
         for cell in range(9):
             column = node.column + cell // 3 - 1
             rank = node.rank + cell % 3 - 1
-            other = own.near_node[bucket_of(own.near_node, column, rank)].first
+            other = frame.near_node[bucket_of(frame.near_node, column, rank)].first
             while other >= 0:
-                near = own.node[other]
+                near = frame.node[other]
                 if other < v and near.column == column and near.rank == rank and _is_close(near, node, least):
-                    _note(found, other, v, -1, -1)
+                    _note(hits, other, v, -1, -1)
                 other = near.following
-            k = own.near_bar[bucket_of(own.near_bar, column, rank)].first
+            k = frame.near_bar[bucket_of(frame.near_bar, column, rank)].first
             while k >= 0:
-                bar = own.bar[k]
+                bar = frame.bar[k]
                 if bar.column == column and bar.rank == rank and _is_beside(v, node, bar, least):
-                    _note(found, v, -1, bar.owner, -1)
+                    _note(hits, v, -1, bar.owner, -1)
                 k = bar.following
 
 
 @jit
-def find_sharp(own: Frame, least: Clearances, found: Hits) -> None:
+def find_sharp(frame: Frame, least: Clearances, hits: Hits) -> None:
     """Note the pairs of roads that meet at an angle whose cosine is not below the least.
 
     Norm: docs/rules.md#arms.
     """
     for gap in range(1, 4):
-        for k in range(own.arm.shape[0] - gap):
-            arm, other = own.arm[k], own.arm[k + gap]
+        for k in range(frame.arm.shape[0] - gap):
+            arm, other = frame.arm[k], frame.arm[k + gap]
             if arm.hub == other.hub and arm.dx * other.dx + arm.dy * other.dy > least.cosine - ROUNDING:
-                _note(found, arm.hub, -1, arm.segment, other.segment)
+                _note(hits, arm.hub, -1, arm.segment, other.segment)
 
 
 @jit
-def put_arms(own: Frame) -> None:
+def put_arms(frame: Frame) -> None:
     """Put the roads out of intersections in order: by these, first those that begin there; pieces are whole roads."""
-    count = own.bar.shape[0]
-    for v in range(own.place.shape[0]):
-        own.place[v] = 0
+    count = frame.bar.shape[0]
+    for v in range(frame.place.shape[0]):
+        frame.place[v] = 0
     for k in range(count):
-        own.place[own.bar[k].a + 1] += 1
-        own.place[own.bar[k].b + 1] += 1
-    for v in range(1, own.place.shape[0]):
-        own.place[v] += own.place[v - 1]
+        frame.place[frame.bar[k].a + 1] += 1
+        frame.place[frame.bar[k].b + 1] += 1
+    for v in range(1, frame.place.shape[0]):
+        frame.place[v] += frame.place[v - 1]
     for k in range(2 * count):
-        bar = own.bar[k if k < count else k - count]
+        bar = frame.bar[k if k < count else k - count]
         hub = bar.a if k < count else bar.b
-        arm = own.arm[int(own.place[hub])]
-        own.place[hub] += 1
+        arm = frame.arm[int(frame.place[hub])]
+        frame.place[hub] += 1
         arm.hub = hub
         arm.segment = k if k < count else k - count
         dx = bar.x1 - bar.x0 if k < count else bar.x0 - bar.x1
@@ -292,44 +292,44 @@ def put_arms(own: Frame) -> None:
 
 
 @jit
-def find_meetings(own: Frame, found: Hits) -> None:
+def find_meetings(frame: Frame, hits: Hits) -> None:
     """Note the pairs of segments of the lattice that meet elsewhere than at a common end; exact, in integers."""
-    _file(own, 0.0)
-    for s in range(own.bar.shape[0]):
-        bar = own.bar[s]
+    _file(frame, 0.0)
+    for s in range(frame.bar.shape[0]):
+        bar = frame.bar[s]
         for cell in range(9):
             column = bar.column + cell // 3 - 1
             rank = bar.rank + cell % 3 - 1
-            other = own.near_bar[bucket_of(own.near_bar, column, rank)].first
+            other = frame.near_bar[bucket_of(frame.near_bar, column, rank)].first
             while other >= 0:
-                near = own.bar[other]
+                near = frame.bar[other]
                 if other < s and near.column == column and near.rank == rank and _meet(near, bar):
-                    _note(found, -1, -1, other, s)
+                    _note(hits, -1, -1, other, s)
                 other = near.following
 
 
 @jit
-def _file(own: Frame, wide: float) -> None:
+def _file(frame: Frame, wide: float) -> None:
     """Put all into cells so wide that what is nearer than `wide` lies in cells beside one another."""
     longest = 0.0
-    for k in range(own.bar.shape[0]):
-        bar = own.bar[k]
+    for k in range(frame.bar.shape[0]):
+        bar = frame.bar[k]
         longest = max(longest, norm(bar.x1 - bar.x0, bar.y1 - bar.y0))
     side = (longest + wide) * WIDER
-    empty(own.near_node)
-    empty(own.near_bar)
-    for v in range(own.node.shape[0]):
-        node = own.node[v]
+    empty(frame.near_node)
+    empty(frame.near_bar)
+    for v in range(frame.node.shape[0]):
+        node = frame.node[v]
         node.column = floor(node.x / side)
         node.rank = floor(node.y / side)
-        bucket = own.near_node[bucket_of(own.near_node, node.column, node.rank)]
+        bucket = frame.near_node[bucket_of(frame.near_node, node.column, node.rank)]
         node.following = bucket.first
         bucket.first = v
-    for k in range(own.bar.shape[0]):
-        bar = own.bar[k]
+    for k in range(frame.bar.shape[0]):
+        bar = frame.bar[k]
         bar.column = floor(0.5 * (bar.x0 + bar.x1) / side)
         bar.rank = floor(0.5 * (bar.y0 + bar.y1) / side)
-        bucket = own.near_bar[bucket_of(own.near_bar, bar.column, bar.rank)]
+        bucket = frame.near_bar[bucket_of(frame.near_bar, bar.column, bar.rank)]
         bar.following = bucket.first
         bucket.first = k
 

@@ -127,9 +127,7 @@ def random_network(
     points, roads = _draw(draws, intersections, segments, least, minimum_angle)
     low_x, low_y = min(x for x, _ in points), min(y for _, y in points)
     moved = [(x - low_x, y - low_y) for x, y in points]
-    rows = tuple(
-        sorted((*moved[a], *moved[b]) if moved[a] < moved[b] else (*moved[b], *moved[a]) for a, b in roads)
-    )
+    rows = tuple(sorted((*moved[a], *moved[b]) if moved[a] < moved[b] else (*moved[b], *moved[a]) for a, b in roads))
     made = RoadNetwork.unchecked(rows, unit, _motion(draws, rigid_motion))
     if not bent > 0.0:
         return made
@@ -166,9 +164,7 @@ def thinned_grid(
     take = floor(removed * count + 1e-9)
     spare = count - (len(grid.intersections) - 1)
     if take > spare:
-        expected = (
-            f"at most {spare} of {count} segments ({floor(1e4 * spare / count) / 1e4:g}), to stay connected"
-        )
+        expected = f"at most {spare} of {count} segments ({floor(1e4 * spare / count) / 1e4:g}), to stay connected"
         raise InputError("too many segments to remove", field="removed", value=removed, expected=expected)
     order = np.array(draws.shuffled(count), dtype=np.int64)
     joins = np.zeros(count, dtype=np.int64)
@@ -190,9 +186,7 @@ def _draw(draws: Draws, count: int, roads: int, least: Clearances, minimum_angle
     if grid:
         return woven(draws, count, roads, least)
     problem = f"can't be placed at angles of at least {180.0 * minimum_angle / pi:.6g} degrees"
-    raise InputError(
-        problem, field="segments", value=roads, expected=f"at most {largest}, the most that were placed"
-    )
+    raise InputError(problem, field="segments", value=roads, expected=f"at most {largest}, the most that were placed")
 
 
 def _motion(draws: Draws, wanted: bool) -> tuple[float, float, float]:
@@ -204,9 +198,7 @@ def _motion(draws: Draws, wanted: bool) -> tuple[float, float, float]:
 def _check_counts(intersections: int, segments: int) -> None:
     if not 2 <= intersections <= MOST_INTERSECTIONS:
         expected = f"an integer in [2, {MOST_INTERSECTIONS}]"
-        raise InputError(
-            "not a number of intersections", field="intersections", value=intersections, expected=expected
-        )
+        raise InputError("not a number of intersections", field="intersections", value=intersections, expected=expected)
     low, high = intersections - 1, most_segments(intersections)
     if not low <= segments <= high:
         expected = f"an integer in [{low}, {high}] for {intersections} intersections"
@@ -256,13 +248,11 @@ def bend_some(
         named = {int(fault.field[len("segments[") : -1]) for fault in faults if fault.field}
         if not any(corners[s] for s in named):
             break
-        corners = [() if s in named else own for s, own in enumerate(corners)]
+        corners = [() if s in named else corner for s, corner in enumerate(corners)]
     return network
 
 
-def _swerve(
-    network: RoadNetwork, s: int, bend: float, slope: float, straight: float, farthest: float
-) -> Corners:
+def _swerve(network: RoadNetwork, s: int, bend: float, slope: float, straight: float, farthest: float) -> Corners:
     """Return the corners with which segment s swerves to the side in its middle; none if it is too short."""
     x0, y0, x1, y1 = network.segments[s]
     length = float(network.lengths[s])

@@ -37,35 +37,35 @@ FORKED = 1.2
 
 
 @jit
-def piece_distance2(own: Piece, x: float, y: float) -> float:
+def piece_distance2(piece: Piece, x: float, y: float) -> float:
     """Return the squared distance from a point to a piece."""
-    rx = x - own.x
-    ry = y - own.y
-    qx = x - own.end_x
-    qy = y - own.end_y
-    if own.side == 0.0:
-        along = rx * own.tx + ry * own.ty
-        off = own.tx * ry - own.ty * rx
-        beside = 0.0 <= along <= own.length
+    rx = x - piece.x
+    ry = y - piece.y
+    qx = x - piece.end_x
+    qy = y - piece.end_y
+    if piece.side == 0.0:
+        along = rx * piece.tx + ry * piece.ty
+        off = piece.tx * ry - piece.ty * rx
+        beside = 0.0 <= along <= piece.length
     else:
-        ox = x - own.cx
-        oy = y - own.cy
-        off = sqrt(ox * ox + oy * oy) - own.radius
-        beside = ox * own.tx + oy * own.ty >= 0.0 and ox * own.end_tx + oy * own.end_ty <= 0.0
+        ox = x - piece.cx
+        oy = y - piece.cy
+        off = sqrt(ox * ox + oy * oy) - piece.radius
+        beside = ox * piece.tx + oy * piece.ty >= 0.0 and ox * piece.end_tx + oy * piece.end_ty <= 0.0
     if beside:
         return off * off
     return min(rx * rx + ry * ry, qx * qx + qy * qy)
 
 
 @jit
-def nearest_piece(pieces: Rows[Piece], own: Segment, x: float, y: float) -> tuple[int, float]:
+def nearest_piece(pieces: Rows[Piece], segment: Segment, x: float, y: float) -> tuple[int, float]:
     """Return the row of the nearest piece of a segment that bends, the first of equally near ones; squared distance.
 
-    `own` (row) is the segment.
+    `segment` (row) is the segment.
     """
-    best = own.piece
+    best = segment.piece
     least = INFINITE
-    for k in range(own.piece, own.last + 1):
+    for k in range(segment.piece, segment.last + 1):
         d2 = piece_distance2(pieces[k], x, y)
         if d2 < least:
             best = k
@@ -74,9 +74,9 @@ def nearest_piece(pieces: Rows[Piece], own: Segment, x: float, y: float) -> tupl
 
 
 @jit_rare
-def bent_distance2(pieces: Rows[Piece], own: Segment, x: float, y: float) -> float:
-    """Return the squared distance from a point to a segment that bends, `own` (row)."""
-    _, least = nearest_piece(pieces, own, x, y)
+def bent_distance2(pieces: Rows[Piece], segment: Segment, x: float, y: float) -> float:
+    """Return the squared distance from a point to a segment that bends, `segment` (row)."""
+    _, least = nearest_piece(pieces, segment, x, y)
     return least
 
 
@@ -100,14 +100,14 @@ def piece_foot(at: Piece, x: float, y: float) -> tuple[float, float, float, floa
 
 @jit
 def bent_foot(
-    pieces: Rows[Piece], own: Segment, back: bool, x: float, y: float
+    pieces: Rows[Piece], segment: Segment, back: bool, x: float, y: float
 ) -> tuple[float, float, float, float]:
-    """Return (s, l, unit vector along the lane there) of a point on a lane of a segment that bends, `own` (row).
+    """Return (s, l, unit vector along the lane there) of a point on a lane of a segment that bends, `segment` (row).
 
     The lane is that from its second to its first end if `back` (flag). Beyond the ends the first and the last
     line go on.
     """
-    k, _ = nearest_piece(pieces, own, x, y)
+    k, _ = nearest_piece(pieces, segment, x, y)
     along, left, tx, ty = piece_foot(pieces[k], x, y)
     if back:
         return pieces[k].rest - along, -left, -tx, -ty
@@ -115,33 +115,29 @@ def bent_foot(
 
 
 @jit_rare
-def bent_coordinates(
-    pieces: Rows[Piece], own: Segment, back: bool, x: float, y: float
-) -> tuple[float, float]:
-    """Return (s, l) of a point on a lane of a segment that bends, `own` (row), `back` (flag), as `bent_foot` does."""
-    along, left, _, _ = bent_foot(pieces, own, back, x, y)
+def bent_coordinates(pieces: Rows[Piece], segment: Segment, back: bool, x: float, y: float) -> tuple[float, float]:
+    """Return (s, l) of a point on a lane of a `segment` (row) that bends, `back` (flag), as `bent_foot` does."""
+    along, left, _, _ = bent_foot(pieces, segment, back, x, y)
     return along, left
 
 
 @jit_rare
-def bent_direction(pieces: Rows[Piece], own: Segment, x: float, y: float) -> tuple[float, float]:
-    """Return the unit vector along a segment that bends, `own` (row), where it is nearest to a point."""
-    k, _ = nearest_piece(pieces, own, x, y)
+def bent_direction(pieces: Rows[Piece], segment: Segment, x: float, y: float) -> tuple[float, float]:
+    """Return the unit vector along a segment that bends, `segment` (row), where it is nearest to a point."""
+    k, _ = nearest_piece(pieces, segment, x, y)
     _, _, tx, ty = piece_foot(pieces[k], x, y)
     return tx, ty
 
 
 @jit
-def bent_place(
-    pieces: Rows[Piece], own: Segment, back: bool, along: float
-) -> tuple[float, float, float, float]:
+def bent_place(pieces: Rows[Piece], segment: Segment, back: bool, along: float) -> tuple[float, float, float, float]:
     """Return (point, unit vector along the lane there) `along` (m) from the start of a lane of a segment that bends.
 
-    `own` (row) and `back` (flag) as for `bent_foot`; beyond the ends the first and the last line go on.
+    `segment` (row) and `back` (flag) as for `bent_foot`; beyond the ends the first and the last line go on.
     """
-    forth = own.length - along if back else along
-    k = own.piece
-    while k < own.last and forth > pieces[k].base + pieces[k].length:
+    forth = segment.length - along if back else along
+    k = segment.piece
+    while k < segment.last and forth > pieces[k].base + pieces[k].length:
         k += 1
     at = pieces[k]
     gone = forth - at.base
@@ -161,16 +157,16 @@ def bent_place(
 def distance2(t: RoadTable, net: int, s: int, x: float, y: float) -> float:
     """Return the squared distance from a point to segment `s` (segment)."""
     row: int = t.seg_off[net] + s
-    own = t.segment[row]
-    if own.piece >= 0:
-        return bent_distance2(t.piece, own, x, y)
-    rx = x - own.x
-    ry = y - own.y
-    qx = x - own.end_x
-    qy = y - own.end_y
-    along = rx * own.tx + ry * own.ty
-    across = own.tx * ry - own.ty * rx
-    beyond = qx * qx + qy * qy if along >= own.length else across * across
+    segment = t.segment[row]
+    if segment.piece >= 0:
+        return bent_distance2(t.piece, segment, x, y)
+    rx = x - segment.x
+    ry = y - segment.y
+    qx = x - segment.end_x
+    qy = y - segment.end_y
+    along = rx * segment.tx + ry * segment.ty
+    across = segment.tx * ry - segment.ty * rx
+    beyond = qx * qx + qy * qy if along >= segment.length else across * across
     return rx * rx + ry * ry if along <= 0.0 else beyond
 
 
@@ -228,9 +224,9 @@ def on_road(t: RoadTable, net: int, x: float, y: float) -> bool:
 def vertex_distance2(t: RoadTable, net: int, v: int, x: float, y: float) -> float:
     """Return the squared distance from a point to intersection v."""
     row: int = t.vert_off[net] + v
-    own = t.vertex[row]
-    rx = x - own.x
-    ry = y - own.y
+    vertex = t.vertex[row]
+    rx = x - vertex.x
+    ry = y - vertex.y
     return rx * rx + ry * ry
 
 
@@ -285,9 +281,7 @@ def _nearest_vertices(t: RoadTable, net: int, cell: int, x: float, y: float) -> 
 
 
 @jit_inline
-def _nearest_segments(
-    t: RoadTable, net: int, cell: int, v: int, x: float, y: float
-) -> tuple[int, float, float, float]:
+def _nearest_segments(t: RoadTable, net: int, cell: int, v: int, x: float, y: float) -> tuple[int, float, float, float]:
     """Return the nearest of the segments listed in a cell; how far it is, the second, and the nearest not at v."""
     best = 0
     least = second = other = INFINITE
@@ -299,8 +293,8 @@ def _nearest_segments(
         second = min(second, max(d2, least))
         least = min(d2, least)
         row: int = t.seg_off[net] + s
-        own = t.segment[row]
-        if v not in (own.first, own.second):
+        segment = t.segment[row]
+        if v not in (segment.first, segment.second):
             other = min(other, d2)
     return best, sqrt(least), sqrt(second), sqrt(other)
 
@@ -361,15 +355,15 @@ def lane_coordinates(t: RoadTable, net: int, lane: int, x: float, y: float) -> t
     Norm: docs/rules.md#segment.
     """
     row: int = t.seg_off[net] + (lane >> 1)
-    own = t.segment[row]
-    if own.piece >= 0:
-        return bent_coordinates(t.piece, own, lane & 1 != 0, x, y)
-    rx = x - own.x
-    ry = y - own.y
-    along = rx * own.tx + ry * own.ty
-    left = own.tx * ry - own.ty * rx
+    segment = t.segment[row]
+    if segment.piece >= 0:
+        return bent_coordinates(t.piece, segment, lane & 1 != 0, x, y)
+    rx = x - segment.x
+    ry = y - segment.y
+    along = rx * segment.tx + ry * segment.ty
+    left = segment.tx * ry - segment.ty * rx
     if lane & 1:
-        return own.length - along, -left
+        return segment.length - along, -left
     return along, left
 
 
@@ -377,30 +371,30 @@ def lane_coordinates(t: RoadTable, net: int, lane: int, x: float, y: float) -> t
 def lane_direction(t: RoadTable, net: int, lane: int) -> tuple[float, float]:
     """Return the unit vector along a lane where it begins."""
     row: int = t.seg_off[net] + (lane >> 1)
-    own = t.segment[row]
+    segment = t.segment[row]
     if lane & 1:
-        return -own.end_tx, -own.end_ty
-    return own.tx, own.ty
+        return -segment.end_tx, -segment.end_ty
+    return segment.tx, segment.ty
 
 
 @jit_inline
 def lane_end_direction(t: RoadTable, net: int, lane: int) -> tuple[float, float]:
     """Return the unit vector along a lane where it ends."""
     row: int = t.seg_off[net] + (lane >> 1)
-    own = t.segment[row]
+    segment = t.segment[row]
     if lane & 1:
-        return -own.tx, -own.ty
-    return own.end_tx, own.end_ty
+        return -segment.tx, -segment.ty
+    return segment.end_tx, segment.end_ty
 
 
 @jit_inline
 def lane_direction_at(t: RoadTable, net: int, lane: int, x: float, y: float) -> tuple[float, float]:
     """Return the unit vector along a lane where its centre line is nearest to a point."""
     row: int = t.seg_off[net] + (lane >> 1)
-    own = t.segment[row]
-    if own.piece < 0:
+    segment = t.segment[row]
+    if segment.piece < 0:
         return lane_direction(t, net, lane)
-    tx, ty = bent_direction(t.piece, own, x, y)
+    tx, ty = bent_direction(t.piece, segment, x, y)
     if lane & 1:
         return -tx, -ty
     return tx, ty
@@ -410,21 +404,21 @@ def lane_direction_at(t: RoadTable, net: int, lane: int, x: float, y: float) -> 
 def bends_before(t: RoadTable, net: int, lane: int, x: float, y: float) -> bool:
     """Tell whether the road of a lane bends between a point and the lane's end."""
     row: int = t.seg_off[net] + (lane >> 1)
-    own = t.segment[row]
-    if own.piece < 0:
+    segment = t.segment[row]
+    if segment.piece < 0:
         return False
-    k, _ = nearest_piece(t.piece, own, x, y)
-    return k != (own.piece if lane & 1 else own.last)
+    k, _ = nearest_piece(t.piece, segment, x, y)
+    return k != (segment.piece if lane & 1 else segment.last)
 
 
 @jit
 def tightness(t: RoadTable, net: int, lane: int, width: float) -> float:
     """Return a `width` (m) in units of the least radius of a lane's road, 0 if that is straight."""
     row: int = t.seg_off[net] + (lane >> 1)
-    own = t.segment[row]
+    segment = t.segment[row]
     most = 0.0
-    if own.piece >= 0:
-        for k in range(own.piece, own.last + 1):
+    if segment.piece >= 0:
+        for k in range(segment.piece, segment.last + 1):
             if t.piece[k].side != 0.0:
                 most = max(most, width / t.piece[k].radius)
     return most
@@ -434,10 +428,10 @@ def tightness(t: RoadTable, net: int, lane: int, width: float) -> float:
 def straight_start(t: RoadTable, net: int, lane: int) -> float:
     """Return how far a lane runs straight from where it begins, metres."""
     row: int = t.seg_off[net] + (lane >> 1)
-    own = t.segment[row]
-    if own.piece < 0:
-        return own.length
-    return t.piece[own.last if lane & 1 else own.piece].length
+    segment = t.segment[row]
+    if segment.piece < 0:
+        return segment.length
+    return t.piece[segment.last if lane & 1 else segment.piece].length
 
 
 @jit_inline

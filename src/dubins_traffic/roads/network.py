@@ -72,7 +72,7 @@ def arms(sides: Sequence[Segment], ends: Ints, count: int) -> list[tuple[int, ..
     for s, (ax, ay, bx, by) in enumerate(sides):
         out[int(ends[s, 0])].append((ax, ay, 2 * s))
         out[int(ends[s, 1])].append((-bx, -by, 2 * s + 1))
-    return [tuple(lane for _, _, lane in sorted(own, key=cmp_to_key(_turn))) for own in out]
+    return [tuple(lane for _, _, lane in sorted(lanes, key=cmp_to_key(_turn))) for lanes in out]
 
 
 def _turn(p: tuple[float, float, int], q: tuple[float, float, int]) -> int:
@@ -85,9 +85,7 @@ def _turn(p: tuple[float, float, int], q: tuple[float, float, int]) -> int:
     return -1 if cross > 0 else 1
 
 
-def shortest(
-    target: int, lane_end: Sequence[int], lengths: Sequence[float], before: Sequence[Sequence[int]]
-) -> Routes:
+def shortest(target: int, lane_end: Sequence[int], lengths: Sequence[float], before: Sequence[Sequence[int]]) -> Routes:
     """Return the shortest routes to the intersection `target` (Dijkstra, backwards over lanes).
 
     Parameters
@@ -203,7 +201,7 @@ class RoadNetwork(Pictured):
         rows, columns = self.shape
         segments, points = len(self.segments), len(self.intersections)
         found = f"{count(segments, 'segment')}, {count(points, 'intersection')}"
-        bent = sum(1 for own in self.corners if own)
+        bent = sum(1 for corner in self.corners if corner)
         if self.on_lattice:
             place = f"on a {rows} x {columns} lattice"
         else:
@@ -217,7 +215,7 @@ class RoadNetwork(Pictured):
 
     def __getstate__(self) -> dict[str, Any]:
         """Leave behind, when pickled, what can be worked out again."""
-        return {own.name: getattr(self, own.name) for own in fields(self)}
+        return {field.name: getattr(self, field.name) for field in fields(self)}
 
     @classmethod
     def grid(
@@ -240,9 +238,7 @@ class RoadNetwork(Pictured):
             raise error.within(file=file) from None
 
     @classmethod
-    def from_text(
-        cls, text: str, file: str | None = None, map_format: MapFormat | None = None
-    ) -> RoadNetwork:
+    def from_text(cls, text: str, file: str | None = None, map_format: MapFormat | None = None) -> RoadNetwork:
         """Return the network in a text, of the format `map_format`, else by its content; `known` has the losses."""
         form = map_format or formats.of_text(text)
         document, losses = formats.document(form, text, file)
@@ -258,8 +254,8 @@ class RoadNetwork(Pictured):
     def to_document(self) -> dict[str, Any]:
         """Return the RND document: segments written out, whole numbers as integers; version 0 wherever that says it."""
         rows = [list(segment) for segment in self.segments]
-        for row, own in zip(rows, self.corners, strict=False):
-            row += [number for corner in own for number in corner]
+        for row, bends in zip(rows, self.corners, strict=False):
+            row += [number for corner in bends for number in corner]
         return {
             "version": 0 if self.is_straight and self.on_lattice else 2,
             "length": _number(self.length),
@@ -277,9 +273,7 @@ class RoadNetwork(Pictured):
         """Return the RND document as plain text."""
         return write_lines(self.to_document())
 
-    def write(
-        self, path: str | Path, map_format: MapFormat | None = None, *, overwrite: bool = False
-    ) -> None:
+    def write(self, path: str | Path, map_format: MapFormat | None = None, *, overwrite: bool = False) -> None:
         """Write a file, whole or not at all, in the format of its suffix; what is no file gets plain text of RND.
 
         `map_format` is asked before the registered ones. A path is refused as `files.require_output` says.
@@ -347,7 +341,7 @@ class RoadNetwork(Pictured):
     @cached_property
     def _successors(self) -> list[tuple[int, ...]]:
         out = [self._arms[v] for v in self.ends[:, ::-1].ravel().tolist()]
-        return [tuple([other for other in own if other != k ^ 1]) or (k ^ 1,) for k, own in enumerate(out)]
+        return [tuple([other for other in lanes if other != k ^ 1]) or (k ^ 1,) for k, lanes in enumerate(out)]
 
     @cached_property
     def _lane_graph(self) -> tuple[list[int], list[float], list[list[int]]]:
@@ -396,7 +390,7 @@ class RoadNetwork(Pictured):
             ends=self.ends.copy(),
             vert_off=np.array([0, len(self.points)]),
             vertex=self._vertex_rows(),
-            arms=np.array([own + (-1,) * (LARGEST_DEGREE - len(own)) for own in self._arms]),
+            arms=np.array([arm + (-1,) * (LARGEST_DEGREE - len(arm)) for arm in self._arms]),
             degree=self.degrees.copy(),
             grid=table(CellGrid, 1),
             **dict.fromkeys(("seg_start", "seg_item", "vert_start", "vert_item", "pave"), none),
@@ -509,24 +503,24 @@ class RoadNetwork(Pictured):
     @cached_property
     def bent(self) -> npt.NDArray[np.bool_]:
         """Whether each segment bends, (S,)."""
-        return _fixed(np.array([bool(own) for own in self.corners] or [False] * len(self.segments)))
+        return _fixed(np.array([bool(corner) for corner in self.corners] or [False] * len(self.segments)))
 
     @cached_property
     def tangents(self) -> Floats:
         """Unit vectors along the segments at their first ends, (S, 2)."""
-        found = self._directions
+        directions = self._directions
         if not self.is_straight:
-            found[self.bent] = self.chains.tangent[self.chains.first[:-1][self.bent]]
-        return _fixed(found)
+            directions[self.bent] = self.chains.tangent[self.chains.first[:-1][self.bent]]
+        return _fixed(directions)
 
     @cached_property
     def end_tangents(self) -> Floats:
         """Unit vectors along the segments at their second ends, (S, 2): equal to `tangents` unless they bend."""
         if self.is_straight:
             return self.tangents
-        found = self._directions
-        found[self.bent] = self.chains.end_tangent[self.chains.first[1:][self.bent] - 1]
-        return _fixed(found)
+        directions = self._directions
+        directions[self.bent] = self.chains.end_tangent[self.chains.first[1:][self.bent] - 1]
+        return _fixed(directions)
 
     @property
     def _directions(self) -> Floats:
@@ -538,9 +532,7 @@ class RoadNetwork(Pictured):
     @cached_property
     def runs(self) -> Runs:
         """The longest straight run of each segment."""
-        straight = Runs(
-            self.points[self.ends[:, 0]], self.points[self.ends[:, 1]], self.tangents, self.lengths
-        )
+        straight = Runs(self.points[self.ends[:, 0]], self.points[self.ends[:, 1]], self.tangents, self.lengths)
         return straight if self.is_straight else self.chains.runs(straight)
 
     @cached_property

@@ -33,24 +33,22 @@ def pack(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> RoadT
 
 def _joined(tables: Sequence[RoadTable]) -> RoadTable:
     """Return several networks one after another, without widths and cells."""
-    plain = {
-        name: np.concatenate([getattr(own, name) for own in tables]) for name in ("ends", "arms", "degree")
-    }
+    plain = {name: np.concatenate([getattr(table, name) for table in tables]) for name in ("ends", "arms", "degree")}
     return tables[0].replace(
         **plain,
-        seg_off=_offsets([len(own.segment) for own in tables]),
-        vert_off=_offsets([len(own.vertex) for own in tables]),
+        seg_off=_offsets([len(table.segment) for table in tables]),
+        vert_off=_offsets([len(table.vertex) for table in tables]),
         segment=_joined_segments(tables),
-        piece=join([own.piece for own in tables]),
-        vertex=join([own.vertex for own in tables]),
+        piece=join([table.piece for table in tables]),
+        vertex=join([table.vertex for table in tables]),
     )
 
 
 def _joined_segments(tables: Sequence[RoadTable]) -> Rows[Segment]:
     """Return the segments of several networks one after another, their pieces numbered so, too."""
-    rows = join([own.segment for own in tables])
-    before = _offsets([len(own.piece) for own in tables])[:-1]
-    shift = np.repeat(before, [len(own.segment) for own in tables])
+    rows = join([table.segment for table in tables])
+    before = _offsets([len(table.piece) for table in tables])[:-1]
+    shift = np.repeat(before, [len(table.segment) for table in tables])
     bent = rows["piece"] >= 0
     rows["piece"] += np.where(bent, shift, 0)
     rows["last"] += np.where(bent, shift, 0)

@@ -164,9 +164,7 @@ class Sketcher:
         draws.go_to(stream.drawn)
 
 
-def sketched(
-    draws: Draws, count: int, roads: int, least: Clearances, minimum_angle: float
-) -> tuple[Drawn | None, int]:
+def sketched(draws: Draws, count: int, roads: int, least: Clearances, minimum_angle: float) -> tuple[Drawn | None, int]:
     """Return a network that has been grown and how many roads it has; None if it has not found the room.
 
     Parameters
@@ -180,11 +178,11 @@ def sketched(
     minimum_angle : float
         Least angle between two roads at an intersection, radians: says how often to try.
     """
-    own = _sketcher(count, roads, least.length, get_ident())
-    own.run(draws, least, ceil(TRIES * pi / max(pi - minimum_angle, 0.02)))
-    if own.plan.is_whole == 0:
-        return None, own.plan.most
-    spot, road = own.tables.spot, own.tables.road
+    drawing = _sketcher(count, roads, least.length, get_ident())
+    drawing.run(draws, least, ceil(TRIES * pi / max(pi - minimum_angle, 0.02)))
+    if drawing.plan.is_whole == 0:
+        return None, drawing.plan.most
+    spot, road = drawing.tables.spot, drawing.tables.road
     points = zip(spot["x"].tolist(), spot["y"].tolist(), strict=True)
     ends = zip(road["a"][:roads].tolist(), road["b"][:roads].tolist(), strict=True)
     return (list(points), list(ends)), roads
@@ -208,7 +206,7 @@ def _offsets(length: float) -> Ints:
 
 
 @jit
-def sketch(plan: Plan, own: Sketch, stream: Stream) -> int:
+def sketch(plan: Plan, drawing: Sketch, stream: Stream) -> int:
     """Try to grow a network, as often as `Plan.left` says; `Plan.is_whole` tells whether it has been done.
 
     Returns the number of couples for which there has to be room to go on, from the last tree; 0 when it has ended.
@@ -216,14 +214,14 @@ def sketch(plan: Plan, own: Sketch, stream: Stream) -> int:
     while plan.is_growing == 1 or plan.left > 0:
         if plan.is_growing == 0:
             plan.left -= 1
-            _clear(plan, own)
-            plan.is_growing = 1 if _grow(plan, own, stream) else 0
+            _clear(plan, drawing)
+            plan.is_growing = 1 if _grow(plan, drawing, stream) else 0
         if plan.is_growing == 1:
-            found = _find_couples(plan, own)
-            if found > own.couple.shape[0]:
-                return found
+            couples = _find_couples(plan, drawing)
+            if couples > drawing.couple.shape[0]:
+                return couples
             plan.is_growing = 0
-            _connect(plan, own, found, stream)
+            _connect(plan, drawing, couples, stream)
             if plan.roads == plan.segments:
                 plan.is_whole = 1
                 return 0
@@ -232,60 +230,60 @@ def sketch(plan: Plan, own: Sketch, stream: Stream) -> int:
 
 
 @jit
-def _clear(plan: Plan, own: Sketch) -> None:
+def _clear(plan: Plan, drawing: Sketch) -> None:
     plan.spots = 0
     plan.roads = 0
-    empty(own.near_spot)
-    empty(own.near_road)
+    empty(drawing.near_spot)
+    empty(drawing.near_road)
 
 
 @jit
-def _grow(plan: Plan, own: Sketch, stream: Stream) -> bool:
+def _grow(plan: Plan, drawing: Sketch, stream: Stream) -> bool:
     """Draw a tree of as many intersections as are wanted; return whether it found the room."""
-    _add_spot(plan, own, 0, 0)
-    own.active[0] = 0
+    _add_spot(plan, drawing, 0, 0)
+    drawing.active[0] = 0
     count = 1
     while plan.spots < plan.intersections and count > 0:
         u = next_uniform(stream)
         k = int(u * u * count)
-        a = int(own.active[k])
-        pick = next_below(stream, own.offset.shape[0])
-        x = own.spot[a].x + own.offset[pick, 0]
-        y = own.spot[a].y + own.offset[pick, 1]
-        if _fits(plan, own, a, -1, x, y):
-            b = _add_spot(plan, own, x, y)
-            _add_road(plan, own, a, b)
-            own.active[count] = b
+        a = int(drawing.active[k])
+        pick = next_below(stream, drawing.offset.shape[0])
+        x = drawing.spot[a].x + drawing.offset[pick, 0]
+        y = drawing.spot[a].y + drawing.offset[pick, 1]
+        if _fits(plan, drawing, a, -1, x, y):
+            b = _add_spot(plan, drawing, x, y)
+            _add_road(plan, drawing, a, b)
+            drawing.active[count] = b
             count += 1
         else:
-            own.spot[a].failures += 1
-            if own.spot[a].failures >= plan.tries:
+            drawing.spot[a].failures += 1
+            if drawing.spot[a].failures >= plan.tries:
                 count -= 1
                 for i in range(k, count):
-                    own.active[i] = own.active[i + 1]
+                    drawing.active[i] = drawing.active[i + 1]
     return plan.spots == plan.intersections
 
 
 @jit
-def _find_couples(plan: Plan, own: Sketch) -> int:
+def _find_couples(plan: Plan, drawing: Sketch) -> int:
     """Return how many roads may be added as far as their length is concerned; write them in order, if there is room."""
     found = 0
     for a in range(plan.spots):
-        spot = own.spot[a]
+        spot = drawing.spot[a]
         begin = found
         for cell in range(9):
             column = spot.column + cell // 3 - 1
             row = spot.row + cell % 3 - 1
-            b = own.near_spot[bucket_of(own.near_spot, column, row)].first
+            b = drawing.near_spot[bucket_of(drawing.near_spot, column, row)].first
             while b >= 0:
-                other = own.spot[b]
+                other = drawing.spot[b]
                 if b > a and other.column == column and other.row == row:
                     dx = other.x - spot.x
                     dy = other.y - spot.y
                     far = sqrt(float(dx * dx + dy * dy))
                     if plan.length <= far <= plan.longest:
-                        if found < own.couple.shape[0]:
-                            _insert(own.couple, begin, found, a, b)
+                        if found < drawing.couple.shape[0]:
+                            _insert(drawing.couple, begin, found, a, b)
                         found += 1
                 b = other.following
     return found
@@ -303,55 +301,55 @@ def _insert(couples: Ints, begin: int, end: int, a: int, b: int) -> None:
 
 
 @jit
-def _connect(plan: Plan, own: Sketch, count: int, stream: Stream) -> None:
+def _connect(plan: Plan, drawing: Sketch, count: int, stream: Stream) -> None:
     """Add roads of the first `count` couples, in random order, until there are enough or no other fits."""
-    shuffle(stream, own.order, count)
+    shuffle(stream, drawing.order, count)
     for k in range(count):
         if plan.roads >= plan.segments:
             break
-        a = int(own.couple[own.order[k], 0])
-        b = int(own.couple[own.order[k], 1])
+        a = int(drawing.couple[drawing.order[k], 0])
+        b = int(drawing.couple[drawing.order[k], 1])
         joined = False
-        for i in range(own.spot[a].degree):
-            joined = joined or _arm(own.spot[a], i) == b
-        if not joined and _fits(plan, own, a, b, own.spot[b].x, own.spot[b].y):
-            _add_road(plan, own, a, b)
+        for i in range(drawing.spot[a].degree):
+            joined = joined or _arm(drawing.spot[a], i) == b
+        if not joined and _fits(plan, drawing, a, b, drawing.spot[b].x, drawing.spot[b].y):
+            _add_road(plan, drawing, a, b)
 
 
 @jit
-def _arm(own: Spot, k: int) -> int:
+def _arm(spot: Spot, k: int) -> int:
     if k == 0:
-        return own.arm0
+        return spot.arm0
     if k == 1:
-        return own.arm1
-    return own.arm2 if k == 2 else own.arm3
+        return spot.arm1
+    return spot.arm2 if k == 2 else spot.arm3
 
 
 @jit
-def _add_arm(own: Spot, v: int) -> None:
-    if own.degree == 0:
-        own.arm0 = v
-    elif own.degree == 1:
-        own.arm1 = v
-    elif own.degree == 2:
-        own.arm2 = v
+def _add_arm(spot: Spot, v: int) -> None:
+    if spot.degree == 0:
+        spot.arm0 = v
+    elif spot.degree == 1:
+        spot.arm1 = v
+    elif spot.degree == 2:
+        spot.arm2 = v
     else:
-        own.arm3 = v
-    own.degree += 1
+        spot.arm3 = v
+    spot.degree += 1
 
 
 @jit
-def _add_spot(plan: Plan, own: Sketch, x: int, y: int) -> int:
+def _add_spot(plan: Plan, drawing: Sketch, x: int, y: int) -> int:
     """Add an intersection; return its number."""
     number = plan.spots
-    spot = own.spot[number]
+    spot = drawing.spot[number]
     spot.degree = 0
     spot.failures = 0
     spot.x = x
     spot.y = y
     spot.column = floor(x / plan.side)
     spot.row = floor(y / plan.side)
-    bucket = own.near_spot[bucket_of(own.near_spot, spot.column, spot.row)]
+    bucket = drawing.near_spot[bucket_of(drawing.near_spot, spot.column, spot.row)]
     spot.following = bucket.first
     bucket.first = number
     plan.spots = number + 1
@@ -359,15 +357,15 @@ def _add_spot(plan: Plan, own: Sketch, x: int, y: int) -> int:
 
 
 @jit
-def _add_road(plan: Plan, own: Sketch, a: int, b: int) -> None:
+def _add_road(plan: Plan, drawing: Sketch, a: int, b: int) -> None:
     """Add a road between two intersections."""
     number = plan.roads
-    road, p, q = own.road[number], own.spot[a], own.spot[b]
+    road, p, q = drawing.road[number], drawing.spot[a], drawing.spot[b]
     road.a = a
     road.b = b
     road.column = floor(((p.x + q.x) >> 1) / plan.side)
     road.row = floor(((p.y + q.y) >> 1) / plan.side)
-    bucket = own.near_road[bucket_of(own.near_road, road.column, road.row)]
+    bucket = drawing.near_road[bucket_of(drawing.near_road, road.column, road.row)]
     road.following = bucket.first
     bucket.first = number
     plan.roads = number + 1
@@ -376,30 +374,30 @@ def _add_road(plan: Plan, own: Sketch, a: int, b: int) -> None:
 
 
 @jit
-def _fits(plan: Plan, own: Sketch, a: int, b: int, x: int, y: int) -> bool:
+def _fits(plan: Plan, drawing: Sketch, a: int, b: int, x: int, y: int) -> bool:
     """Return whether a road from intersection a to the point q = (x, y), of intersection b or of none (-1), fits in."""
-    p = own.spot[a]
-    if not _turns(plan, own, a, x, y) or (b >= 0 and not _turns(plan, own, b, p.x, p.y)):
+    p = drawing.spot[a]
+    if not _turns(plan, drawing, a, x, y) or (b >= 0 and not _turns(plan, drawing, b, p.x, p.y)):
         return False
     first = floor(((p.x + x) >> 1) / plan.side) - 1
     lowest = floor(((p.y + y) >> 1) / plan.side) - 1
     for cell in range(9):
         column = first + cell // 3
         row = lowest + cell % 3
-        v = own.near_spot[bucket_of(own.near_spot, column, row)].first
+        v = drawing.near_spot[bucket_of(drawing.near_spot, column, row)].first
         while v >= 0:
-            spot = own.spot[v]
+            spot = drawing.spot[v]
             if spot.column == column and spot.row == row:
                 if v not in (a, b) and _distance(spot.x, spot.y, p.x, p.y, x, y) < plan.aside:
                     return False
                 if b < 0 and _distance(spot.x, spot.y, x, y, x, y) < plan.apart:
                     return False
             v = spot.following
-        s = own.near_road[bucket_of(own.near_road, column, row)].first
+        s = drawing.near_road[bucket_of(drawing.near_road, column, row)].first
         while s >= 0:
-            road = own.road[s]
+            road = drawing.road[s]
             if road.column == column and road.row == row:
-                r, t = own.spot[road.a], own.spot[road.b]
+                r, t = drawing.spot[road.a], drawing.spot[road.b]
                 if b < 0 and _distance(x, y, r.x, r.y, t.x, t.y) < plan.aside:
                     return False
                 apart = a not in (road.a, road.b) and b not in (road.a, road.b)
@@ -410,15 +408,15 @@ def _fits(plan: Plan, own: Sketch, a: int, b: int, x: int, y: int) -> bool:
 
 
 @jit
-def _turns(plan: Plan, own: Sketch, v: int, x: int, y: int) -> bool:
+def _turns(plan: Plan, drawing: Sketch, v: int, x: int, y: int) -> bool:
     """Return whether intersection v may have another road, toward the lattice point (x, y)."""
-    spot = own.spot[v]
+    spot = drawing.spot[v]
     if spot.degree >= plan.degree:
         return False
     dx = x - spot.x
     dy = y - spot.y
     for k in range(spot.degree):
-        other = own.spot[_arm(spot, k)]
+        other = drawing.spot[_arm(spot, k)]
         ex = other.x - spot.x
         ey = other.y - spot.y
         if dx * ex + dy * ey > plan.cosine * sqrt(float((dx * dx + dy * dy) * (ex * ex + ey * ey))):

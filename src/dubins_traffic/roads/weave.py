@@ -134,9 +134,9 @@ def woven(draws: Draws, count: int, roads: int, least: Clearances) -> Drawn:
     least : Clearances
         In lattice units; its angle at most pi / 2.
     """
-    own = _weaver(count, roads, get_ident())
-    own.run(draws, least)
-    node, bar = own.made.node, own.made.bar
+    weaver = _weaver(count, roads, get_ident())
+    weaver.run(draws, least)
+    node, bar = weaver.made.node, weaver.made.bar
     points = zip(node["x"].astype(np.int64).tolist(), node["y"].astype(np.int64).tolist(), strict=True)
     return list(points), list(zip(bar["a"].tolist(), bar["b"].tolist(), strict=True))
 
@@ -175,7 +175,7 @@ def _weaver(count: int, roads: int, _thread: int) -> Weaver:
 
 
 @jit
-def weave(loom: Loom, web: Web, made: Frame, least: Clearances, found: Hits, stream: Stream) -> None:
+def weave(loom: Loom, web: Web, made: Frame, least: Clearances, hits: Hits, stream: Stream) -> None:
     """Draw a network: its intersections and segments in `made`."""
     _outline(loom, web, stream)
     _choose(loom, web, made, stream)
@@ -186,13 +186,13 @@ def weave(loom: Loom, web: Web, made: Frame, least: Clearances, found: Hits, str
         site.scale = 1.0
     for k in range(loom.intersections + loom.rounds + 1):
         _move(loom, web, made)
-        found.filled[0] = 0
+        hits.filled[0] = 0
         put_arms(made)
-        find_tight(made, least, found)
-        find_meetings(made, found)
-        if found.filled[0] == 0:
+        find_tight(made, least, hits)
+        find_meetings(made, hits)
+        if hits.filled[0] == 0:
             break
-        _mark(web, made, found)
+        _mark(web, made, hits)
         for v in range(loom.intersections):
             site = web.site[v]
             if site.is_bad != 0:
@@ -269,18 +269,18 @@ def _dense(loom: Loom, web: Web) -> None:
 
 
 @jit
-def _before(own: Edge, far: float, x: int, y: int) -> bool:
+def _before(edge: Edge, far: float, x: int, y: int) -> bool:
     """Return whether a site in the border is taken before another."""
-    if own.far != far:
-        return own.far < far
-    return own.x < x or (own.x == x and own.y < y)
+    if edge.far != far:
+        return edge.far < far
+    return edge.x < x or (edge.x == x and edge.y < y)
 
 
 @jit
-def _set(own: Edge, far: float, x: int, y: int) -> None:
-    own.far = far
-    own.x = x
-    own.y = y
+def _set(edge: Edge, far: float, x: int, y: int) -> None:
+    edge.far = far
+    edge.x = x
+    edge.y = y
 
 
 @jit
@@ -403,12 +403,12 @@ def _move(loom: Loom, web: Web, made: Frame) -> None:
 
 
 @jit
-def _mark(web: Web, made: Frame, found: Hits) -> None:
+def _mark(web: Web, made: Frame, hits: Hits) -> None:
     """Mark the sites that have a part in something that falls short."""
     for v in range(web.site.shape[0]):
         web.site[v].is_bad = 0
-    for k in range(min(found.filled[0], found.row.shape[0])):
-        hit = found.row[k]
+    for k in range(min(hits.filled[0], hits.row.shape[0])):
+        hit = hits.row[k]
         _mark_one(web, hit.vertex)
         _mark_one(web, hit.other_vertex)
         for s in (hit.segment, hit.other_segment):

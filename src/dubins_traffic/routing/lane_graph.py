@@ -15,24 +15,28 @@ FAR = 1 << 40
 def frame(roads: RoadTable, net: int, lane: int) -> tuple[float, float, float, float, float]:
     """Return (x, y, tx, ty, length): start, unit direction there and length of a lane on the road's centre line."""
     row: int = roads.seg_off[net] + (lane >> 1)
-    own = roads.segment[row]
-    if own.piece >= 0 and lane & 1:
-        return own.end_x, own.end_y, -own.end_tx, -own.end_ty, own.length
+    segment = roads.segment[row]
+    if segment.piece >= 0 and lane & 1:
+        return segment.end_x, segment.end_y, -segment.end_tx, -segment.end_ty, segment.length
     if lane & 1:
-        return own.x + own.length * own.tx, own.y + own.length * own.ty, -own.tx, -own.ty, own.length
-    return own.x, own.y, own.tx, own.ty, own.length
+        return (
+            segment.x + segment.length * segment.tx,
+            segment.y + segment.length * segment.ty,
+            -segment.tx,
+            -segment.ty,
+            segment.length,
+        )
+    return segment.x, segment.y, segment.tx, segment.ty, segment.length
 
 
 @jit
-def foot(
-    roads: RoadTable, net: int, lane: int, x: float, y: float
-) -> tuple[float, float, float, float, float]:
+def foot(roads: RoadTable, net: int, lane: int, x: float, y: float) -> tuple[float, float, float, float, float]:
     """Return (s, l, tx, ty, length): metres along a lane and left of it, its direction there, and its length."""
     row: int = roads.seg_off[net] + (lane >> 1)
-    own = roads.segment[row]
-    if own.piece >= 0:
-        along, left, tx, ty = bent_foot(roads.piece, own, lane & 1 != 0, x, y)
-        return along, left, tx, ty, own.length
+    segment = roads.segment[row]
+    if segment.piece >= 0:
+        along, left, tx, ty = bent_foot(roads.piece, segment, lane & 1 != 0, x, y)
+        return along, left, tx, ty, segment.length
     ax, ay, tx, ty, length = frame(roads, net, lane)
     rx, ry = x - ax, y - ay
     return rx * tx + ry * ty, tx * ry - ty * rx, tx, ty, length
@@ -42,9 +46,9 @@ def foot(
 def place_on_lane(roads: RoadTable, net: int, lane: int, along: float) -> tuple[float, float, float, float]:
     """Return (x, y, tx, ty): the point of a road's centre line `along` (m) from a lane's start, and the direction."""
     row: int = roads.seg_off[net] + (lane >> 1)
-    own = roads.segment[row]
-    if own.piece >= 0:
-        return bent_place(roads.piece, own, lane & 1 != 0, along)
+    segment = roads.segment[row]
+    if segment.piece >= 0:
+        return bent_place(roads.piece, segment, lane & 1 != 0, along)
     x0, y0, tx, ty, _ = frame(roads, net, lane)
     return x0 + along * tx, y0 + along * ty, tx, ty
 

@@ -60,8 +60,8 @@ class Search(Tables):
 def joined(graphs: Sequence[LaneTables]) -> tuple[LaneTables, list[int], list[int]]:
     """Return several graphs as one, and the numbers in it of the first lane and the first intersection of each."""
     lanes, places, steps = (
-        [0, *accumulate(len(array) for array in own)]
-        for own in zip(*((own.into, own.into_off[1:], own.after) for own in graphs), strict=True)
+        [0, *accumulate(len(array) for array in arrays)]
+        for arrays in zip(*((graph.into, graph.into_off[1:], graph.after) for graph in graphs), strict=True)
     )
     by = {
         "after_off": steps,
@@ -73,9 +73,7 @@ def joined(graphs: Sequence[LaneTables]) -> tuple[LaneTables, list[int], list[in
     }
     found: dict[str, Any] = {}
     for name in LaneTables.field_names:
-        parts = [
-            getattr(own, name) + first for own, first in zip(graphs, by.get(name, repeat(0)), strict=False)
-        ]
+        parts = [getattr(graph, name) + first for graph, first in zip(graphs, by.get(name, repeat(0)), strict=False)]
         if name.endswith("_off"):
             parts[:-1] = [part[:-1] for part in parts[:-1]]
         found[name] = np.concatenate(parts)
@@ -146,11 +144,11 @@ def metres_into(v: int, g: LaneTables, least: Floats, far: Floats, queue: Ints, 
 
 
 @jit
-def shortest_round(goals: Ints, g: LaneTables, own: Search) -> tuple[int, float]:
+def shortest_round(goals: Ints, g: LaneTables, search: Search) -> tuple[int, float]:
     """Find the shortest round through the distinct intersections of `goals` (G,).
 
-    Its lanes are in `own.lane`, the places in it of those that end in a goal as it is reached in `own.arrival`, and the
-    rows of `own.far` with the ways to them in `own.row`.
+    Its lanes are in `search.lane`, the places in it of those that end in a goal as it is reached in `search.arrival`,
+    and the rows of `search.far` with the ways to them in `search.row`.
 
     Returns
     -------
@@ -158,22 +156,22 @@ def shortest_round(goals: Ints, g: LaneTables, own: Search) -> tuple[int, float]
         How many lanes it has, 0 if there is no round, and how long it is.
     """
     count = goals.shape[0]
-    _fill_legs(goals, g, own)
+    _fill_legs(goals, g, search)
     for k in range(count):
-        own.order[k] = k
+        search.order[k] = k
     least = INFINITE
     more = True
     while more:
-        arms = _chain(goals, g, own, own.order)
+        arms = _chain(goals, g, search, search.order)
         for i in range(arms):
-            if own.total[i, i] < least:
-                least = own.total[i, i]
+            if search.total[i, i] < least:
+                least = search.total[i, i]
                 for k in range(count):
-                    own.best[k] = own.order[k]
-        more = _next_order(own.order)
+                    search.best[k] = search.order[k]
+        more = _next_order(search.order)
     if least == INFINITE:
         return 0, least
-    return _trace(goals, g, own), least
+    return _trace(goals, g, search), least
 
 
 @jit
@@ -182,17 +180,17 @@ def _arms(goals: Ints, g: LaneTables, k: Any) -> Any:
 
 
 @jit
-def _fill_legs(goals: Ints, g: LaneTables, own: Search) -> None:
+def _fill_legs(goals: Ints, g: LaneTables, search: Search) -> None:
     count = goals.shape[0]
     for b in range(count):
         for j in range(_arms(goals, g, b)):
-            far = own.far[b, j]
-            metres_to(g.into[g.into_off[goals[b]] + j], g, far, own.queue, own.waits)
+            far = search.far[b, j]
+            metres_to(g.into[g.into_off[goals[b]] + j], g, far, search.queue, search.waits)
             for a in range(count):
                 if a == b and count > 1:
                     continue
                 for i in range(_arms(goals, g, a)):
-                    _, own.leg[a, b, i, j] = _step(g.into[g.into_off[goals[a]] + i], g, far)
+                    _, search.leg[a, b, i, j] = _step(g.into[g.into_off[goals[a]] + i], g, far)
 
 
 @jit
@@ -209,13 +207,13 @@ def _step(lane: Any, g: LaneTables, far: Floats) -> tuple[Any, Any]:
 
 
 @jit
-def _chain(goals: Ints, g: LaneTables, own: Search, order: Ints) -> Any:
-    """Write the metres once round, in an order, from each lane into its first goal to each into `own.total`."""
+def _chain(goals: Ints, g: LaneTables, search: Search, order: Ints) -> Any:
+    """Write the metres once round, in an order, from each lane into its first goal to each into `search.total`."""
     count = goals.shape[0]
     head = _arms(goals, g, order[0])
     for i in range(head):
         for j in range(_arms(goals, g, order[1 % count])):
-            own.total[i, j] = own.leg[order[0], order[1 % count], i, j]
+            search.total[i, j] = search.leg[order[0], order[1 % count], i, j]
     for k in range(1, count):
         a = order[k]
         b = order[(k + 1) % count]
@@ -223,11 +221,11 @@ def _chain(goals: Ints, g: LaneTables, own: Search, order: Ints) -> Any:
             for j in range(_arms(goals, g, b)):
                 least = INFINITE
                 for m in range(_arms(goals, g, a)):
-                    least = min(least, own.total[i, m] + own.leg[a, b, m, j])
-                own.other[i, j] = least
+                    least = min(least, search.total[i, m] + search.leg[a, b, m, j])
+                search.other[i, j] = least
         for i in range(head):
             for j in range(_arms(goals, g, b)):
-                own.total[i, j] = own.other[i, j]
+                search.total[i, j] = search.other[i, j]
     return head
 
 
@@ -253,33 +251,33 @@ def _next_order(order: Ints) -> bool:
 
 
 @jit
-def _trace(goals: Ints, g: LaneTables, own: Search) -> int:
+def _trace(goals: Ints, g: LaneTables, search: Search) -> int:
     """Write the lanes of the best round of the best order, from its first goal to itself; return their number."""
     count = goals.shape[0]
-    arms = _chain(goals, g, own, own.best)
+    arms = _chain(goals, g, search, search.best)
     start = 0
     for i in range(arms):
-        if own.total[i, i] < own.total[start, start]:
+        if search.total[i, i] < search.total[start, start]:
             start = i
     for i in range(arms):
-        own.to_go[count, i] = 0.0 if i == start else INFINITE
+        search.to_go[count, i] = 0.0 if i == start else INFINITE
     for k in range(count - 1, -1, -1):
-        a = own.best[k]
-        b = own.best[(k + 1) % count]
+        a = search.best[k]
+        b = search.best[(k + 1) % count]
         for i in range(_arms(goals, g, a)):
             least = INFINITE
             for j in range(_arms(goals, g, b)):
-                least = min(least, own.leg[a, b, i, j] + own.to_go[k + 1, j])
-            own.to_go[k, i] = least
+                least = min(least, search.leg[a, b, i, j] + search.to_go[k + 1, j])
+            search.to_go[k, i] = least
     done = 0
     at = start
     for k in range(count):
-        a = own.best[k]
-        b = own.best[(k + 1) % count]
+        a = search.best[k]
+        b = search.best[(k + 1) % count]
         following = 0
         least = INFINITE
         for j in range(_arms(goals, g, b)):
-            far = own.leg[a, b, at, j] + own.to_go[k + 1, j]
+            far = search.leg[a, b, at, j] + search.to_go[k + 1, j]
             if far < least:
                 following = j
                 least = far
@@ -287,10 +285,10 @@ def _trace(goals: Ints, g: LaneTables, own: Search) -> int:
         target = g.into[g.into_off[goals[b]] + following]
         begin = done
         while done == begin or lane != target:
-            lane, _ = _step(lane, g, own.far[b, following])
-            own.lane[done] = lane
+            lane, _ = _step(lane, g, search.far[b, following])
+            search.lane[done] = lane
             done += 1
-        own.arrival[k] = done - 1
-        own.row[k] = own.far.shape[1] * b + following
+        search.arrival[k] = done - 1
+        search.row[k] = search.far.shape[1] * b + following
         at = following
     return done

@@ -65,7 +65,7 @@ class LaneGraph:
         count, end = network.lanes, network.ends[:, ::-1].ravel()
         follows = [network.successors(lane) for lane in range(count)]
         length = np.repeat(network.lengths, 2)
-        lane = np.repeat(np.arange(count), [len(own) for own in follows])
+        lane = np.repeat(np.arange(count), [len(follow) for follow in follows])
         other = np.fromiter(chain.from_iterable(follows), dtype=np.int64)
         turn: Floats | float = 0.0
         if turn_cost is not None:
@@ -91,14 +91,14 @@ class LaneGraph:
     @cached_property
     def after(self) -> list[list[tuple[int, float]]]:
         """The lanes that may follow each lane, with what the step costs."""
-        own = self.tables
-        return _parts(list(zip(own.after.tolist(), own.after_cost.tolist(), strict=True)), own.after_off)
+        tables = self.tables
+        return _parts(list(zip(tables.after.tolist(), tables.after_cost.tolist(), strict=True)), tables.after_off)
 
     @cached_property
     def before(self) -> list[list[tuple[int, float]]]:
         """The lanes that each lane may follow, with what the step costs."""
-        own = self.tables
-        return _parts(list(zip(own.before.tolist(), own.before_cost.tolist(), strict=True)), own.before_off)
+        tables = self.tables
+        return _parts(list(zip(tables.before.tolist(), tables.before_cost.tolist(), strict=True)), tables.before_off)
 
     def metres_into(self, intersections: Iterable[int]) -> list[Floats]:
         """Return the metres from the end of each lane to each of some intersections, (L,); inf: there is no way."""
@@ -126,9 +126,7 @@ class LaneGraph:
                     heapq.heappush(heap, (total, other))
         return found
 
-    def step(
-        self, lane: int, distances: Sequence[float], penalty: TurnCost | None = None
-    ) -> tuple[int, float]:
+    def step(self, lane: int, distances: Sequence[float], penalty: TurnCost | None = None) -> tuple[int, float]:
         """Return the next lane toward the target of `distances`, and metres to it by way of that lane (or -1, inf).
 
         At the target itself this begins another way round to it.
@@ -140,9 +138,7 @@ class LaneGraph:
                 best, least = other, total
         return best, least
 
-    def route(
-        self, lane: int, target: int, distances: Sequence[float], penalty: TurnCost | None = None
-    ) -> list[int]:
+    def route(self, lane: int, target: int, distances: Sequence[float], penalty: TurnCost | None = None) -> list[int]:
         """Return the lanes after `lane` up to `target`: at least one, so from `target` itself once round."""
         lanes: list[int] = []
         while lane >= 0 and (lane != target or not lanes):
@@ -192,12 +188,12 @@ def find_rounds(many: Iterable[tuple[LaneGraph, Sequence[int]]]) -> None:
         distinct = tuple(dict.fromkeys(goals))
         if distinct and distinct not in graph.rounds:
             wanted.setdefault(len(distinct), {})[graph, distinct] = None
-    for graph, count in Counter([graph for own in wanted.values() for graph, _ in own]).items():
+    for graph, count in Counter([graph for group in wanted.values() for graph, _ in group]).items():
         if len(graph.rounds) + count > max(FEWEST_KEPT, MOST_KEPT // graph.count):
             graph.rounds.clear()
             graph.stages.clear()
-    for number, own in wanted.items():
-        pairs = list(own)
+    for number, group in wanted.items():
+        pairs = list(group)
         if number <= EXACT:
             for k in range(0, len(pairs), TOGETHER):
                 _find_shortest(number, pairs[k : k + TOGETHER])
@@ -224,20 +220,20 @@ def _find_shortest(number: int, wanted: Sequence[tuple[LaneGraph, tuple[int, ...
     graphs = dict.fromkeys([graph for graph, _ in wanted])
     whole, lanes, places = joined([graph.tables for graph in graphs])
     first = dict(zip(graphs, zip(lanes, places, strict=True), strict=False))
-    own, sought, search = room(number, lanes[-1]), np.zeros(number, dtype=np.int64), bound(shortest_round)
-    far = own.far.reshape(-1, lanes[-1])
+    search_room, sought, search = room(number, lanes[-1]), np.zeros(number, dtype=np.int64), bound(shortest_round)
+    far = search_room.far.reshape(-1, lanes[-1])
     for graph, goals in wanted:
         lane, place = first[graph]
         sought[:] = goals
         sought += place
-        count, length = search(sought, whole, own)
+        count, length = search(sought, whole, search_room)
         if not count:
             graph.rounds[goals] = None
             continue
-        found = Round(tuple((own.lane[:count] - lane).tolist()), tuple(own.arrival.tolist()), length)
-        distance = far[own.row, lane : lane + graph.count] + np.array(graph.length)
+        found = Round(tuple((search_room.lane[:count] - lane).tolist()), tuple(search_room.arrival.tolist()), length)
+        distance = far[search_room.row, lane : lane + graph.count] + np.array(graph.length)
         graph.rounds[goals] = found
-        graph.stages[found] = np.array(goals, dtype=np.int64)[own.row // ARMS], distance
+        graph.stages[found] = np.array(goals, dtype=np.int64)[search_room.row // ARMS], distance
 
 
 def _nearest_first(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:

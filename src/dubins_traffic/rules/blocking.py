@@ -26,20 +26,20 @@ class RightLane(NamedTuple):
 
 
 @jit_inline
-def lane_of(t: RoadTable, own: TrialRules, b: int, lane: int) -> RightLane:
-    """Return the right lane of `lane` in trial b, whose rules are `own`."""
-    return RightLane(b, lane, t.segment[int(t.seg_off[own.net]) + (lane >> 1)].length, own.lane_width)
+def lane_of(t: RoadTable, rules: TrialRules, b: int, lane: int) -> RightLane:
+    """Return the right lane of `lane` in trial b, whose rules are `rules`."""
+    return RightLane(b, lane, t.segment[int(t.seg_off[rules.net]) + (lane >> 1)].length, rules.lane_width)
 
 
 @jit_inline
 def place_in_lane(
-    b: int, k: int, lane: int, state: State, t: RoadTable, own: TrialRules
+    b: int, k: int, lane: int, state: State, t: RoadTable, rules: TrialRules
 ) -> tuple[float, float, float]:
     """Return the progress in `lane` of car `k` (number) of trial b, and the lateral interval of its body, metres."""
     x, y = state.x[b, k], state.y[b, k]
-    progress, lateral = lane_coordinates(t, own.net, lane, x, y)
-    tx, ty = lane_direction_at(t, own.net, lane, x, y)
-    half = half_across(b, k, tx, ty, state, own)
+    progress, lateral = lane_coordinates(t, rules.net, lane, x, y)
+    tx, ty = lane_direction_at(t, rules.net, lane, x, y)
+    half = half_across(b, k, tx, ty, state, rules)
     return progress, lateral - half, lateral + half
 
 
@@ -56,9 +56,7 @@ def narrows(low: float, high: float, lane_width: float, needed: float) -> bool:
 
 
 @jit_rare
-def obstacle_narrows(
-    obstacles: ObstacleLanes, place: RightLane, near: float, far: float, needed: float
-) -> bool:
+def obstacle_narrows(obstacles: ObstacleLanes, place: RightLane, near: float, far: float, needed: float) -> bool:
     """Tell whether an obstacle leaves less than `needed` metres of a right lane free between two places along it.
 
     The stretch is from `near` (m) to `far` (m) along the lane. The lateral interval of an obstacle is the hull of its

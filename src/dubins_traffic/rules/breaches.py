@@ -25,13 +25,13 @@ FIRST_AND_CLEAR = FLAG.FIRST | FLAG.CLEAR
 def add(log: BreachLog, car: JudgedCar, rule: int, tick: int, since: int, vertex: int, lane: int) -> None:
     """Append a breach of `rule`, a number in `RULES`, in frame `tick` to the log; the trial is left to fill in."""
     k: int = log.filled[0]
-    found = log.row[k]
-    found.rule = rule
-    found.car = car.number
-    found.tick = tick
-    found.since = since
-    found.vertex = vertex
-    found.lane = lane
+    row = log.row[k]
+    row.rule = rule
+    row.car = car.number
+    row.tick = tick
+    row.since = since
+    row.vertex = vertex
+    row.lane = lane
     log.filled[0] = k + 1
 
 
@@ -59,9 +59,7 @@ def when_due(tick: int, since: int, ago: int) -> int:
 
 
 @jit_rare
-def judge_lane(
-    car: JudgedCar, bits: Any, lane: int, tick: int, terms: RefereeParameters, log: BreachLog
-) -> None:
+def judge_lane(car: JudgedCar, bits: Any, lane: int, tick: int, terms: RefereeParameters, log: BreachLog) -> None:
     """Judge rule 2: a car is left only while overtaking, and for at most `left_time` unless it is hemmed in.
 
     `bits` (FLAG) and `lane` are those of the car in this frame.
@@ -133,9 +131,7 @@ def judge_queue(b: int, n: int, tick: int, v: int, tables: RefereeTables) -> Non
     """
     log, terms, kept = tables.log, tables.terms[b], tables.memory.car[b, n]
     car, lane = log.car[b, n], tables.labels.lane[b, n]
-    car.first_since = run(
-        tables.labels.bits[b, n] & FIRST_AND_CLEAR == FIRST_AND_CLEAR, tick, car.first_since
-    )
+    car.first_since = run(tables.labels.bits[b, n] & FIRST_AND_CLEAR == FIRST_AND_CLEAR, tick, car.first_since)
     if lasted(tick, car.first_since) == terms.enter_ticks:
         add(log, car, RULE.ENTER, tick, car.first_since, v, lane)
     if kept.forfeits == terms.most_tickets + 1 and kept.ticket == tick:

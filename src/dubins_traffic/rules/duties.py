@@ -122,7 +122,7 @@ def excuse_of(b: int, n: int, tick: int, tables: RefereeTables) -> tuple[bool, b
     Norm: docs/rules.md#way, docs/rules.md#moving-up.
     """
     roads, labels, row = tables.roads, tables.labels, tables.memory.car[b]
-    own, terms = tables.rules[b], tables.terms[b]
+    rules, terms = tables.rules[b], tables.terms[b]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
     if lane < 0 or (bits & FLAG.STOPPED != 0 and bits & FIRST_AND_CLEAR != FIRST_AND_CLEAR):
@@ -130,19 +130,19 @@ def excuse_of(b: int, n: int, tick: int, tables: RefereeTables) -> tuple[bool, b
     if bits & FLAG.LEFT != 0:
         return _is_by_ego(b, n, tables), False
     here = row[n].progress
-    place = lane_of(roads, own, b, lane)
-    v = lane_end(roads, own.net, lane)
+    place = lane_of(roads, rules, b, lane)
+    v = lane_end(roads, rules.net, lane)
     excused = _is_narrow(b, n, place, here, tables) or _lacks_room(b, n, place, here, v, tables)
-    vertex = int(roads.vert_off[own.net]) + v
+    vertex = int(roads.vert_off[rules.net]) + v
     degree = roads.degree[vertex]
-    if excused or degree >= own.crossing_degree or place.length - own.radius - here > terms.way:
+    if excused or degree >= rules.crossing_degree or place.length - rules.radius - here > terms.way:
         return excused, True
     for k in range(tables.state.count[b]):
         if k != n and labels.crosses[b, k] == v and (k == EGO or tables.log.car[b, k].came_by == lane):
             return True, True
     vx, vy = roads.vertex[vertex].x, roads.vertex[vertex].y
     count = list_near(tables.state, b, tick, vx, vy, terms.lone, tables.spacing)
-    if find_exit(b, n, v, way_back(v, lane, roads, own), count, tables):
+    if find_exit(b, n, v, way_back(v, lane, roads, rules), count, tables):
         return False, False
     return True, degree > 2 or _is_goal(b, v, tables)
 
@@ -175,12 +175,12 @@ def _is_by_ego(b: int, n: int, tables: RefereeTables) -> bool:
 @jit_inline
 def _is_narrow(b: int, n: int, place: RightLane, here: float, tables: RefereeTables) -> bool:
     """Tell whether a body, standing or not, narrows the lane ahead of car n, whose progress is `here` (m)."""
-    own, way = tables.rules[b], tables.terms[b].way
+    rules, way = tables.rules[b], tables.terms[b].way
     for k in range(tables.state.count[b]):
         if k != n and tables.labels.segment[b, k] == place.lane // 2:
-            progress, low, high = place_in_lane(b, k, place.lane, tables.state, tables.roads, own)
+            progress, low, high = place_in_lane(b, k, place.lane, tables.state, tables.roads, rules)
             near = 0.0 < progress - here <= way
-            if near and narrows(low, high, own.lane_width, own.free_needed + GRAIN):
+            if near and narrows(low, high, rules.lane_width, rules.free_needed + GRAIN):
                 return True
     return False
 
@@ -195,26 +195,26 @@ def _lacks_room(b: int, n: int, place: RightLane, here: float, v: int, tables: R
 
     Norm: docs/rules.md#lacks-room.
     """
-    obstacles, own, way, labels = tables.obstacles, tables.rules[b], tables.terms[b].way, tables.labels
-    needed = own.free_needed + GRAIN
+    obstacles, rules, way, labels = tables.obstacles, tables.rules[b], tables.terms[b].way, tables.labels
+    needed = rules.free_needed + GRAIN
     if not obstacle_narrows(obstacles, place, here, here + way, needed):
         return False
-    room = 2.0 * own.half_length + RETURNS * own.overtaking_behind
-    if tables.roads.segment[int(tables.roads.seg_off[own.net]) + (place.lane >> 1)].piece >= 0:
+    room = 2.0 * rules.half_length + RETURNS * rules.overtaking_behind
+    if tables.roads.segment[int(tables.roads.seg_off[rules.net]) + (place.lane >> 1)].piece >= 0:
         room *= INSIDE
-    if obstacle_narrows(obstacles, place, max(here, place.length - own.radius - room), here + way, needed):
+    if obstacle_narrows(obstacles, place, max(here, place.length - rules.radius - room), here + way, needed):
         return True
-    left, there = lane_of(tables.roads, own, b, place.lane ^ 1), place.length - here
+    left, there = lane_of(tables.roads, rules, b, place.lane ^ 1), place.length - here
     if obstacle_narrows(obstacles, left, there - 2.0 * way, there, needed):
         return True
-    begin = lane_start(tables.roads, own.net, place.lane)
+    begin = lane_start(tables.roads, rules.net, place.lane)
     for k in range(tables.state.count[b]):
         if k == n:
             continue
         bits = np.int64(labels.bits[b, k])
         rear = here - way - GRAIN if k == EGO and bits & FLAG.STANDS == 0 else here
         behind = labels.at[b, k] == begin or (labels.lane[b, k] == place.lane and bits & FLAG.LEFT == 0)
-        behind = behind and place_in_lane(b, k, place.lane, tables.state, tables.roads, own)[0] < rear
+        behind = behind and place_in_lane(b, k, place.lane, tables.state, tables.roads, rules)[0] < rear
         if labels.crosses[b, k] == v or (labels.segment[b, k] == place.lane // 2 and not behind):
             return True
     return False
@@ -265,12 +265,12 @@ def _holds_up(b: int, v: int, tick: int, tables: RefereeTables) -> tuple[bool, i
     The ego also is near an exit, or one of those e-agents waits for it. Also returns the tick in which to ask again if
     no car comes or goes.
     """
-    roads, own = tables.roads, tables.rules[b]
+    roads, rules = tables.roads, tables.rules[b]
     near = False
     for n in range(EGO + 1, tables.state.count[b]):
         if tables.labels.at[b, n] != v:
             continue
-        back = way_back(v, tables.log.car[b, n].came_by, roads, own)
+        back = way_back(v, tables.log.car[b, n].came_by, roads, rules)
         free, again = look_for_exit(b, n, tick, v, back, tables)
         if free:
             return False, again

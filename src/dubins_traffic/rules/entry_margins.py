@@ -28,39 +28,35 @@ def measure_entry(b: int, tick: int, v: int, stopped: bool, count: int, tables: 
     `rules.breaches.judge_entry`; the signs follow its judgement.
     """
     log = tables.log
-    found = log.entry[b]
-    own = log.car[b, EGO]
+    entry = log.entry[b]
+    ego = log.car[b, EGO]
     if stopped:
-        found.stop = min(found.stop, max(1.0, float(tick - own.ticket)))
+        entry.stop = min(entry.stop, max(1.0, float(tick - ego.ticket)))
         lead = _lead(b, v, tables)
-        found.order = min(found.order, min(lead, -1.0) if own.bits & FLAG.AHEAD != 0 else max(lead, 1.0))
+        entry.order = min(entry.order, min(lead, -1.0) if ego.bits & FLAG.AHEAD != 0 else max(lead, 1.0))
     else:
-        run = tick - 1 - own.approach_since if own.approach_since >= 0 else 0
-        found.stop = min(found.stop, -max(1.0, float(tables.rules[b].stop_ticks - run)))
-    _measure_clearance(b, v, count, found, tables)
+        run = tick - 1 - ego.approach_since if ego.approach_since >= 0 else 0
+        entry.stop = min(entry.stop, -max(1.0, float(tables.rules[b].stop_ticks - run)))
+    _measure_clearance(b, v, count, entry, tables)
 
 
 @jit
 def _lead(b: int, v: int, tables: RefereeTables) -> float:
     """Return how many ticks after the ego's ticket the next ticket at v was taken; negative: before it."""
     log, net = tables.log, tables.rules[b].net
-    own = log.car[b, EGO].ticket
+    ticket = log.car[b, EGO].ticket
     lead = INFINITE
     for k in range(1, tables.state.count[b]):
         other = log.car[b, k]
-        if (
-            other.bits & FLAG.STOPPED != 0
-            and other.lane >= 0
-            and lane_end(tables.roads, net, other.lane) == v
-        ):
-            lead = min(lead, float(other.ticket - own))
+        if other.bits & FLAG.STOPPED != 0 and other.lane >= 0 and lane_end(tables.roads, net, other.lane) == v:
+            lead = min(lead, float(other.ticket - ticket))
     return lead
 
 
 @jit
-def _measure_clearance(b: int, v: int, count: int, found: EntryMargins, tables: RefereeTables) -> None:
-    log, state, roads, own = tables.log, tables.state, tables.roads, tables.rules[b]
-    vertex = roads.vertex[int(roads.vert_off[own.net]) + v]
+def _measure_clearance(b: int, v: int, count: int, margins: EntryMargins, tables: RefereeTables) -> None:
+    log, state, roads, rules = tables.log, tables.state, tables.roads, tables.rules[b]
+    vertex = roads.vertex[int(roads.vert_off[rules.net]) + v]
     broken = False
     nearest = INFINITE
     for i in range(count):
@@ -70,7 +66,7 @@ def _measure_clearance(b: int, v: int, count: int, found: EntryMargins, tables: 
         broken = broken or log.car[b, k].crosses == v
         square = distance2_to_body(
             vertex.x, vertex.y, state.x[b, k], state.y[b, k], state.c[b, k], state.s[b, k],
-            own.half_length, own.half_width,
+            rules.half_length, rules.half_width,
         )  # fmt: skip
-        nearest = min(nearest, sqrt(square) - own.rounding - own.radius)
-    found.clear = min(found.clear, min(nearest, -LEAST) if broken else max(nearest, LEAST))
+        nearest = min(nearest, sqrt(square) - rules.rounding - rules.radius)
+    margins.clear = min(margins.clear, min(nearest, -LEAST) if broken else max(nearest, LEAST))

@@ -17,21 +17,21 @@ from dubins_traffic.rules.tables import GRAIN, TrialRules
 
 
 @jit_inline
-def _is_bend(v: int, t: RoadTable, own: TrialRules) -> bool:
+def _is_bend(v: int, t: RoadTable, rules: TrialRules) -> bool:
     """Tell whether v is neither a crossing nor a dead end."""
-    degree = t.degree[t.vert_off[own.net] + v]
-    return bool(2 <= degree < own.crossing_degree)
+    degree = t.degree[t.vert_off[rules.net] + v]
+    return bool(2 <= degree < rules.crossing_degree)
 
 
 @jit_inline
-def way_back(v: int, came: int, t: RoadTable, own: TrialRules) -> int:
+def way_back(v: int, came: int, t: RoadTable, rules: TrialRules) -> int:
     """Return the segment by which a car came to v if v is a bend, where that segment is no exit for it; else -1.
 
     The car came by the lane `came` (-1: none).
 
     Norm: docs/rules.md#exit.
     """
-    return came // 2 if came >= 0 and _is_bend(v, t, own) else -1
+    return came // 2 if came >= 0 and _is_bend(v, t, rules) else -1
 
 
 @jit_inline
@@ -51,9 +51,9 @@ def lane_taken(b: int, n: int, v: int, tables: RefereeTables) -> int:
 @jit_inline
 def _is_barred(b: int, lane: int, tables: RefereeTables) -> bool:
     """Tell whether an obstacle narrows a lane next to the disc at its beginning."""
-    own, place = tables.rules[b], lane_of(tables.roads, tables.rules[b], b, lane)
-    near, far = own.radius, own.radius + tables.terms[b].exit_room
-    return obstacle_narrows(tables.obstacles, place, near, far, own.free_needed + GRAIN)
+    rules, place = tables.rules[b], lane_of(tables.roads, tables.rules[b], b, lane)
+    near, far = rules.radius, rules.radius + tables.terms[b].exit_room
+    return obstacle_narrows(tables.obstacles, place, near, far, rules.free_needed + GRAIN)
 
 
 @jit_inline
@@ -75,9 +75,7 @@ class LaneOut(NamedTuple):
 
 
 @jit_inline
-def _narrows_lane(
-    b: int, k: int, out: LaneOut, lateral: float, body: Shape, state: State, roads: RoadTable
-) -> bool:
+def _narrows_lane(b: int, k: int, out: LaneOut, lateral: float, body: Shape, state: State, roads: RoadTable) -> bool:
     """Tell whether the body of car `k` (index), `lateral` (m) left of a lane's centre line, narrows the lane `out`."""
     tx, ty = lane_direction_at(roads, out.net, out.lane, state.x[b, k], state.y[b, k])
     half = half_across(b, k, tx, ty, state, body)
@@ -85,9 +83,7 @@ def _narrows_lane(
 
 
 @jit
-def takes_lane(
-    b: int, k: int, out: LaneOut, body: Shape, state: State, labels: Labels, roads: RoadTable
-) -> bool:
+def takes_lane(b: int, k: int, out: LaneOut, body: Shape, state: State, labels: Labels, roads: RoadTable) -> bool:
     """Tell whether car `k` (index), whose centre is outside the disc at the beginning of a lane, takes that lane.
 
     The car, whose `body` (m) is given, is near that disc. Its body narrows the lane, or its centre is in it and the car
@@ -106,12 +102,12 @@ def takes_lane(
 
 
 @jit_inline
-def to_mouth(along: float, lateral: float, own: TrialRules, terms: RefereeParameters) -> float:
+def to_mouth(along: float, lateral: float, rules: TrialRules, terms: RefereeParameters) -> float:
     """Return the distance of (along, lateral) from the point where a lane leaves the disc at its beginning, metres.
 
     Norm: docs/rules.md#mouth.
     """
-    far, aside = along - own.radius, lateral + terms.lane_middle
+    far, aside = along - rules.radius, lateral + terms.lane_middle
     return sqrt(far * far + aside * aside)
 
 
@@ -144,8 +140,8 @@ def taken_exits(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables
 
     The lane on `back` (segment) may be among them.
     """
-    state, t, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
-    net = own.net
+    state, t, rules, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
+    net = rules.net
     row = int(t.vert_off[net]) + v
     x, y = state.x[b, k], state.y[b, k]
     dx, dy = x - t.vertex[row].x, y - t.vertex[row].y
@@ -153,22 +149,22 @@ def taken_exits(b: int, n: int, k: int, v: int, back: int, tables: RefereeTables
     inside = tables.labels.at[b, k] == v
     came = tables.log.car[b, k].came_by
     # Two cars that meet in a bend, each in front of the other's exit, do not excuse each other so.
-    passes_by = inside and _is_bend(v, t, own) and came >= 0 and came // 2 != back
+    passes_by = inside and _is_bend(v, t, rules) and came >= 0 and came // 2 != back
     if away2 > terms.exit2 or (passes_by and k != EGO):
         return 0
     taken = 0
     for arm in range(t.degree[row]):
         lane = t.arms[row, arm]
-        out = LaneOut(net, lane, own.lane_width, own.free_needed)
+        out = LaneOut(net, lane, rules.lane_width, rules.free_needed)
         if inside:
             along, lateral = lane_coordinates(t, net, lane, x, y)
             from_x, from_y = lane_coordinates(t, net, lane, state.x[b, n], state.y[b, n])
-            way = to_mouth(from_x, from_y, own, terms)
-            in_the_way = to_mouth(along, lateral, own, terms) < way + GRAIN
+            way = to_mouth(from_x, from_y, rules, terms)
+            in_the_way = to_mouth(along, lateral, rules, terms) < way + GRAIN
             if in_the_way and passes_by:
-                in_the_way = _narrows_lane(b, k, out, lateral, own, state, t)
+                in_the_way = _narrows_lane(b, k, out, lateral, rules, state, t)
         else:
-            in_the_way = takes_lane(b, k, out, own, state, tables.labels, t)
+            in_the_way = takes_lane(b, k, out, rules, state, tables.labels, t)
         if in_the_way:
             taken |= 1 << arm
     return taken
@@ -182,9 +178,9 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
     near it with its centre outside is in the way of one exit at most: so while fewer cars are near than there are
     lanes, and none has its centre in the disc, an exit is free until another car can have come near or into the disc.
     """
-    state, t, spacing, own = tables.state, tables.roads, tables.spacing, tables.rules[b]
+    state, t, spacing, rules = tables.state, tables.roads, tables.spacing, tables.rules[b]
     far2, lone = tables.terms[b].exit2, tables.terms[b].lone
-    row = int(t.vert_off[own.net]) + v
+    row = int(t.vert_off[rules.net]) + v
     vx, vy = t.vertex[row].x, t.vertex[row].y
     near = inside = 0
     nearest2 = beyond2 = lone * lone
@@ -202,7 +198,7 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
         beyond2 = min(beyond2, d2 if d2 > far2 else beyond2)
     free, spare, lanes = near == 0, sqrt(beyond2) - sqrt(far2), t.degree[row] - (0 if back < 0 else 1)
     if not free and near < lanes and inside == 0 and lane_taken(b, n, v, tables) < 0:
-        free, spare = True, min(spare, sqrt(nearest2) - own.radius)
+        free, spare = True, min(spare, sqrt(nearest2) - rules.radius)
     if free and tables.obstacles.base[b] < 0:
         return True, tick + ticks_within(spare - GRAIN, spacing, b)
     return find_exit(b, n, v, back, count, tables), tick + 1
@@ -211,14 +207,14 @@ def look_for_exit(b: int, n: int, tick: int, v: int, back: int, tables: RefereeT
 @jit
 def ego_at_exit(b: int, v: int, back: int, tables: RefereeTables) -> bool:
     """Tell whether the ego of trial b is near the mouth of an exit of v (E6); the lane on `back` (segment) is none."""
-    state, t, own, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
-    row = int(t.vert_off[own.net]) + v
+    state, t, rules, terms = tables.state, tables.roads, tables.rules[b], tables.terms[b]
+    row = int(t.vert_off[rules.net]) + v
     x, y = state.x[b, EGO], state.y[b, EGO]
     for arm in range(t.degree[row]):
         lane: int = t.arms[row, arm]
         if lane // 2 == back:
             continue
-        along, lateral = lane_coordinates(t, own.net, lane, x, y)
-        if to_mouth(along, lateral, own, terms) <= terms.goal_gap:
+        along, lateral = lane_coordinates(t, rules.net, lane, x, y)
+        if to_mouth(along, lateral, rules, terms) <= terms.goal_gap:
             return True
     return False

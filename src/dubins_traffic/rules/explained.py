@@ -29,20 +29,14 @@ RULE_WORDS: Final[Mapping[str, Words]] = {
         "reaches over the centre line",
         "The ego comes over the centre line only while it overtakes something that stands in its lane.",
     ),
-    "2.return": Words(
-        "stays over the centre line", "Who overtakes is back in his own lane within 10 seconds."
-    ),
+    "2.return": Words("stays over the centre line", "Who overtakes is back in his own lane within 10 seconds."),
     "2.turn": Words("turns round on a road", "The ego turns round in intersections only, not on a road."),
     "3.stop": Words(
         "enters a crossing without a stop",
         "Before it enters a crossing, the ego stops at its edge and stands there for half a second.",
     ),
-    "3.order": Words(
-        "enters a crossing before its turn", "Who has stopped first at a crossing enters it first."
-    ),
-    "3.clear": Words(
-        "enters a crossing that is taken", "The ego enters a crossing only if no other car is in it."
-    ),
+    "3.order": Words("enters a crossing before its turn", "Who has stopped first at a crossing enters it first."),
+    "3.clear": Words("enters a crossing that is taken", "The ego enters a crossing only if no other car is in it."),
     "E2": Words("is at fault in a collision", "The other cars are never at fault in a collision."),
     "E3.enter": Words(
         "is first at a clear crossing and does not enter",
@@ -52,9 +46,7 @@ RULE_WORDS: Final[Mapping[str, Words]] = {
         "loses its place in the order",
         "Another car gives up its turn at a crossing at most once while it waits there.",
     ),
-    "E4": Words(
-        "stays in a disc with a free exit", "Another car leaves an intersection within 5 seconds, if it can."
-    ),
+    "E4": Words("stays in a disc with a free exit", "Another car leaves an intersection within 5 seconds, if it can."),
     "E5": Words(
         "takes too long from one intersection to another",
         "Another car goes on to the next intersection in time, as long as its way is free.",

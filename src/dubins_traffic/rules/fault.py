@@ -39,15 +39,13 @@ def with_fault(contact: Contact, bits: Bits) -> Contact:
     A car that did not move is never at fault. A car that hits an obstacle is. Of two cars those that closed in are
     considered: if exactly one of these is in breach it alone is at fault, otherwise all of these are.
     """
-    own = int(bits[contact.car])
-    return with_fault_by(contact, own, int(bits[contact.other]) if contact.other >= 0 else 0)
+    flags = int(bits[contact.car])
+    return with_fault_by(contact, flags, int(bits[contact.other]) if contact.other >= 0 else 0)
 
 
-def with_fault_by(contact: Contact, own: int, other: int) -> Contact:
+def with_fault_by(contact: Contact, flags: int, other: int) -> Contact:
     """Do as `with_fault`, given the flags of `contact.car` and of the other car."""
     if contact.other < 0:
         return replace(contact, at_fault=(contact.moved[0], False))
-    first, second = (
-        moved and closing > 0.0 for moved, closing in zip(contact.moved, contact.closing, strict=True)
-    )
-    return replace(contact, at_fault=blamed(first, second, in_breach(own), in_breach(other)))
+    first, second = (moved and closing > 0.0 for moved, closing in zip(contact.moved, contact.closing, strict=True))
+    return replace(contact, at_fault=blamed(first, second, in_breach(flags), in_breach(other)))

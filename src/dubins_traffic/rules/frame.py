@@ -43,14 +43,14 @@ def label_trial(b: int, tick: int, tables: LabelTables) -> None:
     Norm: docs/rules.md#order-in-a-frame.
     """
     state, labels, memory = tables.state, tables.labels, tables.memory
-    own, row, due = tables.rules[b], memory.car[b], memory.due[b]
-    check_label_caches(b, tick, state, own, memory)
+    rules, row, due = tables.rules[b], memory.car[b], memory.due[b]
+    check_label_caches(b, tick, state, rules, memory)
     cars = state.count[b]
     stirred = False
     count = 0
     some = 0
     for n in range(cars):
-        if not relabel_from_cache(b, n, tables.roads, own, labels, memory):
+        if not relabel_from_cache(b, n, tables.roads, rules, labels, memory):
             stirred |= locate(b, n, tick, tables)
         elif row[n].zone == 0:
             some |= np.int64(labels.bits[b, n])
@@ -73,16 +73,16 @@ def label_trial(b: int, tick: int, tables: LabelTables) -> None:
 def _order_queues(b: int, tick: int, tables: LabelTables) -> None:
     """Order the queues of trial b, excuse the cars behind them, and flag the cars that stand."""
     labels, memory, t = tables.labels, tables.memory, tables.roads
-    own, head, row, members = tables.rules[b], memory.head[b], memory.car[b], memory.member[b]
+    rules, head, row, members = tables.rules[b], memory.head[b], memory.car[b], memory.member[b]
     bits, lanes = labels.bits[b], labels.lane[b]
     cars: int = tables.state.count[b]
     for n in range(cars):
         if bits[n] & FLAG.STOPPED == 0:
             continue
-        v = lane_end(t, own.net, lanes[n])
+        v = lane_end(t, rules.net, lanes[n])
         if head[v].queue == n:
             queue = Queue(row, lanes, members, gather(n, row, members))
-            keep_order(t, own, queue, head[v].crossers == 0, tick)
+            keep_order(t, rules, queue, head[v].crossers == 0, tick)
             _flag_queue(n, row, bits)
     for n in range(cars):
         lane: int = lanes[n]
@@ -93,10 +93,10 @@ def _order_queues(b: int, tick: int, tables: LabelTables) -> None:
         if lane < 0:
             bits[n] = _with_stands(np.int64(bits[n]))
         elif head[lane].lane == n:
-            _excuse(n, own.excuse, row, bits)
+            _excuse(n, rules.excuse, row, bits)
     for n in range(cars):
         if bits[n] & FLAG.STOPPED != 0:
-            head[lane_end(t, own.net, lanes[n])].queue = -1
+            head[lane_end(t, rules.net, lanes[n])].queue = -1
 
 
 @jit
@@ -128,38 +128,38 @@ def _label_approach(b: int, n: int, tick: int, tables: LabelTables) -> Any:
     Norm: docs/rules.md#clear, docs/rules.md#approach, docs/rules.md#stopped.
     """
     labels, memory = tables.labels, tables.memory
-    own, row, head = tables.rules[b], memory.car[b], memory.head[b]
+    rules, row, head = tables.rules[b], memory.car[b], memory.head[b]
     car = row[n]
     gap2 = car.gap2
     lane: int = labels.lane[b, n]
     crosses: int = labels.crosses[b, n]
     bits = np.int64(labels.bits[b, n]) & ~FLAG.CLEAR
     car.rank = -1
-    left = FLAG.LEFT if car.reach > own.left_set else 0
+    left = FLAG.LEFT if car.reach > rules.left_set else 0
     if gap2 < 0.0:
         if bits & FLAG.IN_CROSSING != 0 and head[crosses].crossers == 1:
             bits |= FLAG.CLEAR
         bits &= ~FLAG.STOPPED
         labels.bits[b, n] = bits
         return bits | left
-    v = lane_end(tables.roads, own.net, lane)
+    v = lane_end(tables.roads, rules.net, lane)
     ahead = head[v]
     if ahead.crossers == (1 if crosses == v else 0):
         bits |= FLAG.CLEAR
-    outside = gap2 >= own.cross2
+    outside = gap2 >= rules.cross2
     if not outside:
         car.wait_since = -1
-    if not outside or gap2 > own.queue2:
+    if not outside or gap2 > rules.queue2:
         bits &= ~FLAG.STOPPED
-    if outside and gap2 <= own.stop2 and foremost(n, head[lane].lane, row, own):
-        if gap2 <= own.approach2:
+    if outside and gap2 <= rules.stop2 and foremost(n, head[lane].lane, row, rules):
+        if gap2 <= rules.approach2:
             bits |= FLAG.APPROACH
         if car.approach_since < 0:
             car.approach_since = tick
-        ago = own.stop_ticks
+        ago = rules.stop_ticks
         if bits & FLAG.STOPPED == 0 and tick - car.approach_since >= ago:
             x, y = tables.state.x[b, n], tables.state.y[b, n]
-            if moved2(b, n, tick, ago, x, y, memory) <= own.stop_move2:
+            if moved2(b, n, tick, ago, x, y, memory) <= rules.stop_move2:
                 bits |= FLAG.STOPPED
                 _give_ticket(car, tick)
     else:
@@ -234,7 +234,7 @@ def _label_blocked(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     Norm: docs/rules.md#left, docs/rules.md#blocked, docs/rules.md#overtaking.
     """
     labels, t = tables.labels, tables.roads
-    own, car = tables.rules[b], tables.memory.car[b, n]
+    rules, car = tables.rules[b], tables.memory.car[b, n]
     lane = labels.lane[b, n]
     bits = np.int64(labels.bits[b, n])
     if lane < 0:
@@ -242,31 +242,31 @@ def _label_blocked(b: int, n: int, tick: int, tables: LabelTables) -> bool:
         return False
     blocked, beside = _cars_beside(b, n, lane, tables)
     if tables.obstacles.base[b] >= 0:
-        place = lane_of(t, own, b, lane)
+        place = lane_of(t, rules, b, lane)
         here = car.progress
         blocked = blocked or obstacle_narrows(
-            tables.obstacles, place, here, here + own.blocked_ahead, own.free_needed
+            tables.obstacles, place, here, here + rules.blocked_ahead, rules.free_needed
         )
         beside = beside or obstacle_narrows(
             tables.obstacles,
             place,
-            here - own.overtaking_behind,
-            here + own.overtaking_ahead,
-            own.free_needed,
+            here - rules.overtaking_behind,
+            here + rules.overtaking_ahead,
+            rules.free_needed,
         )
     if blocked:
         if bits & FLAG.OVERTAKING == 0:
             forget_region(tables.memory.kept[b, n // BLOCK], n)
         bits |= FLAG.BLOCKED | FLAG.OVERTAKING
     was_left = bits & FLAG.LEFT != 0
-    if car.reach > own.left_set:
+    if car.reach > rules.left_set:
         if bits & FLAG.LEFT == 0:
             car.left_since = tick
         bits |= FLAG.LEFT
-    elif car.reach < own.left_release:
+    elif car.reach < rules.left_release:
         bits &= ~FLAG.LEFT
     ends = not beside and not blocked and not was_left and bits & FLAG.LEFT == 0
-    if ends or bits & FLAG.ENTERED != 0 or labels.crosses[b, n] == lane_end(t, own.net, lane):
+    if ends or bits & FLAG.ENTERED != 0 or labels.crosses[b, n] == lane_end(t, rules.net, lane):
         bits &= ~FLAG.OVERTAKING
     labels.bits[b, n] = bits
     return bits & FLAG.LEFT != 0
@@ -276,17 +276,17 @@ def _label_blocked(b: int, n: int, tick: int, tables: LabelTables) -> bool:
 def _cars_beside(b: int, n: int, lane: int, tables: LabelTables) -> tuple[bool, bool]:
     """Tell whether a standing car blocks the lane of car n, and whether one is so near that n still overtakes."""
     state, t, row = tables.state, tables.roads, tables.memory.car[b]
-    own = tables.rules[b]
+    rules = tables.rules[b]
     here = row[n].progress
     blocked = False
     beside = False
     other = tables.memory.head[b, lane // 2].segment
     while other >= 0:
         if other != n and tables.labels.bits[b, other] & FLAG.STANDS != 0:
-            progress, low, high = place_in_lane(b, other, lane, state, t, own)
+            progress, low, high = place_in_lane(b, other, lane, state, t, rules)
             ahead = progress - here
-            if narrows(low, high, own.lane_width, own.free_needed):
-                blocked = blocked or 0.0 < ahead <= own.blocked_ahead
-                beside = beside or -own.overtaking_behind <= ahead <= own.overtaking_ahead
+            if narrows(low, high, rules.lane_width, rules.free_needed):
+                blocked = blocked or 0.0 < ahead <= rules.blocked_ahead
+                beside = beside or -rules.overtaking_behind <= ahead <= rules.overtaking_ahead
         other = row[other].next_on_segment
     return blocked, beside

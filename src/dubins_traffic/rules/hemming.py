@@ -29,12 +29,12 @@ def hem_in(b: int, tick: int, tables: LabelTables) -> None:
 @jit
 def _is_hemmed(b: int, n: int, tables: LabelTables) -> bool:
     """Tell whether near car n there is a car that was not still in some frame since n became left."""
-    state, row, own = tables.state, tables.memory.car[b], tables.rules[b]
+    state, row, rules = tables.state, tables.memory.car[b], tables.rules[b]
     since = row[n].left_since
     for other in range(state.count[b]):
         if other != n and row[other].stirred >= since:
             dx = state.x[b, other] - state.x[b, n]
             dy = state.y[b, other] - state.y[b, n]
-            if dx * dx + dy * dy <= own.hem2:
+            if dx * dx + dy * dy <= rules.hem2:
                 return True
     return False

@@ -89,8 +89,14 @@ def distinct_problems(problems: Sequence[ProblemT]) -> tuple[list[ProblemT], Int
     """
     first, index = distinct(
         [
-            (id(own.rules), id(own.car), own.intersection_radius, own.rate, own.sensing_radius)
-            for own in problems
+            (
+                id(problem.rules),
+                id(problem.car),
+                problem.intersection_radius,
+                problem.rate,
+                problem.sensing_radius,
+            )
+            for problem in problems
         ]
     )
     return [problems[k] for k in first], index

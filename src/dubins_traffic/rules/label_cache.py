@@ -32,21 +32,21 @@ FARTHEST = 100.0
 
 
 @jit_inline
-def check_label_caches(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> None:
+def check_label_caches(b: int, tick: int, state: State, rules: TrialRules, memory: Memory) -> None:
     """Find which cars of trial b have valid cached labels, and which are still; store where all cars are.
 
     Of cars with valid labels it also finds which linger, and stores their greatest progress.
     """
-    _load_positions(b, tick, state, own, memory)
-    still2 = own.stand_move2 if tick >= own.stand_ticks else -1.0
-    growth = memory.growth[b, growth_row(tick, own)]
+    _load_positions(b, tick, state, rules, memory)
+    still2 = rules.stand_move2 if tick >= rules.stand_ticks else -1.0
+    growth = memory.growth[b, growth_row(tick, rules)]
     count = state.count[b]
     for first in range(0, count, BLOCK):
         here = min(count - first, BLOCK)
         last = (here + WIDE - 1) & -WIDE
         block = memory.kept[b, first // BLOCK]
-        _check_valid_regions(block, last, own.turn_back)
-        _check_motion(block, growth[first : first + last], float(tick), own.linger_growth, still2)
+        _check_valid_regions(block, last, rules.turn_back)
+        _check_motion(block, growth[first : first + last], float(tick), rules.linger_growth, still2)
 
 
 @jit_inline
@@ -121,11 +121,11 @@ def _check_motion(block: ValidRegions, growth: Floats, now: float, least: float,
 
 
 @jit_inline
-def _load_positions(b: int, tick: int, state: State, own: TrialRules, memory: Memory) -> None:
+def _load_positions(b: int, tick: int, state: State, rules: TrialRules, memory: Memory) -> None:
     """Copy the present positions of the cars, and those `stand_time` ago, into the blocks of trial b."""
     depth, places = memory.trail_x.shape[1], memory.trail_x.shape[2]
     now = tick % depth
-    then = (now + depth - own.stand_ticks) % depth
+    then = (now + depth - rules.stand_ticks) % depth
     x, y, now_x, now_y = state.x[b], state.y[b], memory.trail_x[b, now], memory.trail_y[b, now]
     past_x, past_y = memory.trail_x[b, then], memory.trail_y[b, then]
     for first in range(0, places, BLOCK):
@@ -151,9 +151,9 @@ def _load_positions(b: int, tick: int, state: State, own: TrialRules, memory: Me
 
 
 @jit_inline
-def growth_row(tick: int, own: TrialRules) -> int:
+def growth_row(tick: int, rules: TrialRules) -> int:
     """Return the row of `Memory.growth` for frame `tick`; until it is overwritten it holds that `linger_time` ago."""
-    return tick % max(own.linger_ticks, 1)
+    return tick % max(rules.linger_ticks, 1)
 
 
 @jit_inline
@@ -172,9 +172,7 @@ def lingers(block: ValidRegions, n: int) -> int:
 
 
 @jit_inline
-def note_growth(
-    block: ValidRegions, n: int, tick: int, lane: int, fresh: bool, top: float, own: TrialRules
-) -> None:
+def note_growth(block: ValidRegions, n: int, tick: int, lane: int, fresh: bool, top: float, rules: TrialRules) -> None:
     """Find whether car n, just located in `lane` (-1: none), lingers; `fresh`: that lane was set in this frame.
 
     `top` is its greatest progress, metres, which the caller has to write to `Memory.growth`.
@@ -185,14 +183,14 @@ def note_growth(
     if lane < 0:
         block.lingers_from[k] = NEVER_AGAIN
     elif fresh:
-        block.lingers_from[k] = float(tick + own.linger_ticks)
+        block.lingers_from[k] = float(tick + rules.linger_ticks)
     long = tick >= block.lingers_from[k]
-    little = top - block.top_then[k] < own.linger_growth
+    little = top - block.top_then[k] < rules.linger_growth
     block.was_lingering[k] = 1.0 if long and little else 0.0
 
 
 @jit_look
-def relabel_from_cache(b: int, n: int, t: RoadTable, own: TrialRules, labels: Labels, memory: Memory) -> bool:
+def relabel_from_cache(b: int, n: int, t: RoadTable, rules: TrialRules, labels: Labels, memory: Memory) -> bool:
     """Relabel car n of trial b if its cached labels are valid: update progress and flags only.
 
     Returns False, and leaves the labels alone, if they may be invalid. To be called after `check_label_caches`.
@@ -204,7 +202,7 @@ def relabel_from_cache(b: int, n: int, t: RoadTable, own: TrialRules, labels: La
         return False
     if holds == IF_NEAREST:
         x, y = block.here_x[k], block.here_y[k]
-        segment, _ = nearest_arm(t, own.net, memory.cell[b, n].vertex, x, y)
+        segment, _ = nearest_arm(t, rules.net, memory.cell[b, n].vertex, x, y)
         if segment != labels.segment[b, n]:
             return False
     car = memory.car[b, n]
@@ -218,7 +216,13 @@ def relabel_from_cache(b: int, n: int, t: RoadTable, own: TrialRules, labels: La
 
 @jit_inline
 def keep_region(
-    block: ValidRegions, n: int, away2: float, spare: float, cell: ValidCell, car: CarMemory, own: TrialRules
+    block: ValidRegions,
+    n: int,
+    away2: float,
+    spare: float,
+    cell: ValidCell,
+    car: CarMemory,
+    rules: TrialRules,
 ) -> None:
     """Store the region in which the labels of car n, just located, are valid, apart from its lane's strip.
 
@@ -233,7 +237,7 @@ def keep_region(
     block.valid_low_y[k] = max(cell.low_y, y - half)
     block.valid_high_y[k] = min(cell.high_y, y + half)
     block.top_so_far[k] = car.top
-    _keep_ring(block, k, away2, own)
+    _keep_ring(block, k, away2, rules)
 
 
 @jit_inline
@@ -243,12 +247,12 @@ def forget_region(block: ValidRegions, n: int) -> None:
 
 
 @jit_inline
-def _keep_ring(block: ValidRegions, k: int, away2: float, own: TrialRules) -> None:
+def _keep_ring(block: ValidRegions, k: int, away2: float, rules: TrialRules) -> None:
     """Store the ring about a car's vertex that holds `away2`: between the radii of disc, crossing and approach."""
     low = -1.0
     high = FARTHEST * FARTHEST
-    outer2 = max(own.stop2, own.queue2)
-    for edge2 in (own.radius * own.radius, own.cross2, outer2):
+    outer2 = max(rules.stop2, rules.queue2)
+    for edge2 in (rules.radius * rules.radius, rules.cross2, outer2):
         if edge2 <= away2:
             low = max(low, edge2)
         else:

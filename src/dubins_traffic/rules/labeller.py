@@ -86,9 +86,7 @@ class Labeller:
         self._look = bound(label_frame)
         self._tick = -1
 
-    def update(
-        self, tick: int, state: State, contacts: Sequence[Sequence[Contact]]
-    ) -> Sequence[Sequence[Contact]]:
+    def update(self, tick: int, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Contact]]:
         """Label frame `tick`, the next one, and return `contacts`, those of the tick that led to it, with `at_fault`.
 
         Raises
@@ -101,9 +99,7 @@ class Labeller:
         judged: Sequence[Sequence[Contact]] = contacts
         if any(contacts):
             bits = self.labels.bits
-            judged = [
-                tuple(with_fault(contact, bits[b]) for contact in own) for b, own in enumerate(contacts)
-            ]
+            judged = [tuple(with_fault(contact, bits[b]) for contact in touched) for b, touched in enumerate(contacts)]
         self._tick = tick
         self._label(state)
         return judged
@@ -153,9 +149,7 @@ class Labeller:
         self._look(self._tick, self.seeing(state))
 
 
-def _judged3(
-    problems: Sequence[JudgedProblem], parameters: Sequence[RuleParameters], index: Ints
-) -> list[bool]:
+def _judged3(problems: Sequence[JudgedProblem], parameters: Sequence[RuleParameters], index: Ints) -> list[bool]:
     """Tell for each problem whether it asks for the rules and rule 3 is defined on its roads (docs/rules.md#room)."""
     known: dict[tuple[int, int], bool] = {}
     judged: list[bool] = []
@@ -168,9 +162,9 @@ def _judged3(
     return judged
 
 
-def _defined3(problem: JudgedProblem, own: RuleParameters) -> bool:
+def _defined3(problem: JudgedProblem, parameters: RuleParameters) -> bool:
     """Tell whether rule 3 is defined on the roads of a problem."""
     radius, reach = problem.intersection_radius, problem.car.body.reach
-    if problem.sensing_radius < 2.0 * (radius + reach + own.sensing_slack) - SLACK:
+    if problem.sensing_radius < 2.0 * (radius + reach + parameters.sensing_slack) - SLACK:
         return False
-    return not clearance_faults(problem.network, radius, reach, problem.car.w, own.segment_slack)
+    return not clearance_faults(problem.network, radius, reach, problem.car.w, parameters.segment_slack)

@@ -26,7 +26,7 @@ BISECTED = 1e-4
 @jit_inline
 def keep_road(
     block: ValidRegions, n: int, lane: int, segment: int, vertex: int, lateral: float, outside: float, t: RoadTable,
-    own: TrialRules,
+    rules: TrialRules,
 ) -> bool:  # fmt: skip
     """Store for car n, in a `block` (columns), its vertex and segment and the strip in which its labels are valid.
 
@@ -35,13 +35,13 @@ def keep_road(
     the road, or off it, as it is now; False if that is not known.
     """
     k = n & (BLOCK - 1)
-    net = own.net
+    net = rules.net
     place = int(t.vert_off[net]) + vertex
     block.vertex_x[k] = t.vertex[place].x
     block.vertex_y[k] = t.vertex[place].y
     row = int(t.seg_off[net]) + (lane >> 1 if lane >= 0 else segment)
     if t.segment[row].piece >= 0:
-        return _keep_piece(block, k, lane, lateral, row, t, own)
+        return _keep_piece(block, k, lane, lateral, row, t, rules)
     length = t.segment[row].length
     back = lane >= 0 and lane & 1 != 0
     block.from_x[k] = t.segment[row].x
@@ -51,17 +51,17 @@ def keep_road(
     block.base[k] = length if back else 0.0
     block.sign[k] = 0.0 if lane < 0 else (-1.0 if back else 1.0)
     if lane >= 0:
-        _keep_strip(block, k, back, lateral, outside, length, t.half_width[net], own)
+        _keep_strip(block, k, back, lateral, outside, length, t.half_width[net], rules)
         return True
     return _keep_sides(block, k, length, t.half_width[net])
 
 
 @jit_rare
 def _keep_piece(
-    block: ValidRegions, k: int, lane: int, lateral: float, row: int, t: RoadTable, own: TrialRules
+    block: ValidRegions, k: int, lane: int, lateral: float, row: int, t: RoadTable, rules: TrialRules
 ) -> bool:
     """Do as `keep_road` on a segment that bends, for a car on the road beside one of its lines; else store nothing."""
-    net = own.net
+    net = rules.net
     place, _ = nearest_piece(t.piece, t.segment[row], block.here_x[k], block.here_y[k])
     piece = t.piece[place]
     back = lane >= 0 and lane & 1 != 0
@@ -77,13 +77,14 @@ def _keep_piece(
         block.along_low[k] = HUGE
         return False
     if lane >= 0:
-        _keep_strip(block, k, back, lateral, 0.0, piece.length, half, own)
+        _keep_strip(block, k, back, lateral, 0.0, piece.length, half, rules)
     return True
 
 
 @jit_inline
 def _keep_strip(
-    block: ValidRegions, k: int, back: bool, lateral: float, outside: float, length: float, half: float, own: TrialRules
+    block: ValidRegions, k: int, back: bool, lateral: float, outside: float, length: float, half: float,
+    rules: TrialRules,
 ) -> None:  # fmt: skip
     """Store the strip in which a car is on the road, or off it, as it is now, and not left.
 
@@ -98,7 +99,7 @@ def _keep_strip(
         low = half + CERTAIN
     else:
         high = -half - CERTAIN
-    most = own.left_set - own.rounding - CERTAIN
+    most = rules.left_set - rules.rounding - CERTAIN
     if lateral >= most:
         low = high
     elif back:
@@ -139,9 +140,7 @@ def _keep_sides(block: ValidRegions, k: int, length: float, half: float) -> bool
 
 
 @jit_inline
-def keep_arm(
-    block: ValidRegions, n: int, segment: int, away2: float, cell: ValidCell, t: RoadTable, net: int
-) -> None:
+def keep_arm(block: ValidRegions, n: int, segment: int, away2: float, cell: ValidCell, t: RoadTable, net: int) -> None:
     """Store in `block` (columns) where `segment` is the nearest of the roads that meet at the vertex of car n.
 
     Let u be the unit vector along this road, w along another, and r the vector from the vertex to the car. If r.u > 0

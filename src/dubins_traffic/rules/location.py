@@ -53,17 +53,17 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     Norm: docs/rules.md#on-road, docs/rules.md#at, docs/rules.md#cross.
     """
     state, t, labels, memory = tables.state, tables.roads, tables.labels, tables.memory
-    own, car, cell, block = tables.rules[b], memory.car[b, n], memory.cell[b, n], memory.kept[b, n // BLOCK]
-    net = own.net
+    rules, car, cell, block = tables.rules[b], memory.car[b, n], memory.cell[b, n], memory.kept[b, n // BLOCK]
+    net = rules.net
     pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
     half_road = t.half_width[net]
-    segment, off2 = _look_up(pose.x, pose.y, t, own, cell)
+    segment, off2 = _look_up(pose.x, pose.y, t, rules, cell)
     v = cell.vertex
     away2 = vertex_distance2(t, net, v, pose.x, pose.y)
-    at = v if away2 < own.radius * own.radius else -1
-    round_body = own.half_length + own.half_width == 0.0
-    body2 = away2 if round_body else _distance2_to_vertex(t, own, v, pose)
-    crosses = v if body2 < own.cross2 else -1
+    at = v if away2 < rules.radius * rules.radius else -1
+    round_body = rules.half_length + rules.half_width == 0.0
+    body2 = away2 if round_body else _distance2_to_vertex(t, rules, v, pose)
+    crosses = v if body2 < rules.cross2 else -1
 
     before = np.int64(labels.bits[b, n])
     lane_before, crossed = labels.lane[b, n], labels.crosses[b, n]
@@ -74,10 +74,10 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     else:
         lane, fresh = lane_here(t, net, labels.at[b, n], lane_before, segment, off2, pose)
         lane, car.progress, car.lateral, turned = along_lane(
-            t, net, lane, fresh, min(car.top, car.held_top), own.turn_back, pose
+            t, net, lane, fresh, min(car.top, car.held_top), rules.turn_back, pose
         )
         keep_tops(car, fresh or turned, before & FLAG.OVERTAKING != 0)
-    bits = _entry_flags(tick, t, own, crosses, crossed, lane_before, before) | (FLAG.TURNED if turned else 0)
+    bits = _entry_flags(tick, t, rules, crosses, crossed, lane_before, before) | (FLAG.TURNED if turned else 0)
     if off2 <= half_road * half_road:
         bits |= FLAG.ON_ROAD
     if lane != lane_before:
@@ -89,30 +89,30 @@ def locate(b: int, n: int, tick: int, tables: LabelTables) -> bool:
     labels.at[b, n] = at
     labels.crosses[b, n] = crosses
     labels.lane[b, n] = lane
-    note_growth(block, n, tick, lane, lane != lane_before, car.top, own)
-    memory.growth[b, growth_row(tick, own), n] = car.top
+    note_growth(block, n, tick, lane, lane != lane_before, car.top, rules)
+    memory.growth[b, growth_row(tick, rules), n] = car.top
     labels.bits[b, n] = bits | still(block, n) | lingers(block, n)
 
-    spare, outside = _reach(car, pose, v, lane, t, own)
+    spare, outside = _reach(car, pose, v, lane, t, rules)
     passes = bits & (FLAG.LEFT | FLAG.OVERTAKING) != 0 or car.held_top < NEVER_AGAIN
     if not round_body or passes or (lane >= 0 and segment != lane // 2):
         spare = 0.0
-    if not keep_road(block, n, lane, segment, v, car.lateral, outside, t, own):
+    if not keep_road(block, n, lane, segment, v, car.lateral, outside, t, rules):
         spare = min(spare, abs(sqrt(off2) - half_road))
-    keep_region(block, n, away2, spare, cell, car, own)
+    keep_region(block, n, away2, spare, cell, car, rules)
     keep_arm(block, n, segment, away2, cell, t, net)
     return _change_crossing(crossed, crosses, memory.head[b])
 
 
 @jit_inline
-def _look_up(x: float, y: float, t: RoadTable, own: TrialRules, cell: ValidCell) -> tuple[int, float]:
+def _look_up(x: float, y: float, t: RoadTable, rules: TrialRules, cell: ValidCell) -> tuple[int, float]:
     """Return the nearest segment and the squared distance from it, by `cell`, which is found anew if it is not valid.
 
     `cell.vertex` is the nearest vertex if the disc about the body may meet that vertex's disc.
     """
-    net = own.net
+    net = rules.net
     if not _is_in(cell, x, y):
-        valid_cell(t, net, x, y, sqrt(own.cross2) + own.half_length + own.half_width, cell)
+        valid_cell(t, net, x, y, sqrt(rules.cross2) + rules.half_length + rules.half_width, cell)
     segment = cell.segment
     if segment >= 0:
         return segment, distance2(t, net, segment, x, y)
@@ -126,9 +126,7 @@ def _is_in(cell: ValidCell, x: float, y: float) -> bool:
 
 
 @jit_inline
-def _reach(
-    car: CarMemory, pose: Pose, v: int, lane: int, t: RoadTable, own: TrialRules
-) -> tuple[float, float]:
+def _reach(car: CarMemory, pose: Pose, v: int, lane: int, t: RoadTable, rules: TrialRules) -> tuple[float, float]:
     """Find how far to the left the body reaches in its lane, and how far it is from the crossing ahead.
 
     Returns metres that a round body may move before it comes to where cars approach and queue, if the crossing is not
@@ -137,25 +135,25 @@ def _reach(
 
     Norm: docs/rules.md#progress.
     """
-    net = own.net
-    round_body = own.half_length + own.half_width == 0.0
+    net = rules.net
+    round_body = rules.half_length + rules.half_width == 0.0
     reach = 0.0
     gap2 = -1.0
     zone = 0
     spare = FARTHEST
     outside = 0.0
     if lane >= 0:
-        half = own.rounding
+        half = rules.rounding
         if not round_body:
             tx, ty = lane_direction_at(t, net, lane, pose.x, pose.y)
-            half = half_extent(tx, ty, pose.c, pose.s, own)
+            half = half_extent(tx, ty, pose.c, pose.s, rules)
         reach = car.lateral + half
         end = lane_end(t, net, lane)
-        if t.degree[t.vert_off[net] + end] >= own.crossing_degree:
+        if t.degree[t.vert_off[net] + end] >= rules.crossing_degree:
             gap2 = vertex_distance2(t, net, end, pose.x, pose.y)
             if not round_body:
-                gap2 = _distance2_to_vertex(t, own, end, pose)
-            outer2 = max(own.stop2, own.queue2)
+                gap2 = _distance2_to_vertex(t, rules, end, pose)
+            outer2 = max(rules.stop2, rules.queue2)
             outer = sqrt(outer2) + CERTAIN
             road = t.segment[int(t.seg_off[net]) + (lane >> 1)]
             to_go = road.length - car.progress
@@ -163,7 +161,7 @@ def _reach(
                 outside = outer
             elif end != v:
                 spare = max(sqrt(gap2) - outer, 0.0)
-            zone = 1 if own.cross2 <= gap2 <= outer2 else 0
+            zone = 1 if rules.cross2 <= gap2 <= outer2 else 0
     car.reach = reach
     car.gap2 = gap2
     car.zone = zone
@@ -171,16 +169,16 @@ def _reach(
 
 
 @jit_inline
-def _distance2_to_vertex(t: RoadTable, own: TrialRules, v: int, pose: Pose) -> float:
+def _distance2_to_vertex(t: RoadTable, rules: TrialRules, v: int, pose: Pose) -> float:
     """Return the squared distance of intersection v from a body without its rounding, square metres."""
-    row = int(t.vert_off[own.net]) + v
+    row = int(t.vert_off[rules.net]) + v
     px, py = t.vertex[row].x, t.vertex[row].y
-    return distance2_to_body(px, py, pose.x, pose.y, pose.c, pose.s, own.half_length, own.half_width)
+    return distance2_to_body(px, py, pose.x, pose.y, pose.c, pose.s, rules.half_length, rules.half_width)
 
 
 @jit_inline
 def _entry_flags(
-    tick: int, t: RoadTable, own: TrialRules, crosses: int, crossed: int, lane_before: int, before: Any
+    tick: int, t: RoadTable, rules: TrialRules, crosses: int, crossed: int, lane_before: int, before: Any
 ) -> Any:
     """Return HELD_FLAGS of the flags of the frame `before`, and the flags of the disc that the body meets.
 
@@ -191,14 +189,14 @@ def _entry_flags(
     bits = before & HELD_FLAGS
     if crosses < 0:
         return bits & ~FLAG.BREACH3
-    crossing = t.degree[t.vert_off[own.net] + crosses] >= own.crossing_degree
+    crossing = t.degree[t.vert_off[rules.net] + crosses] >= rules.crossing_degree
     if crosses != crossed:
         bits &= ~FLAG.BREACH3
         if tick > 0:
             bits |= FLAG.ENTERED
-        if crossing and tick > 0 and own.judged3 != 0:
+        if crossing and tick > 0 and rules.judged3 != 0:
             rightly = before & RULE3 == FLAG.STOPPED | FLAG.CLEAR
-            if not (rightly and lane_end(t, own.net, lane_before) == crosses):
+            if not (rightly and lane_end(t, rules.net, lane_before) == crosses):
                 bits |= FLAG.BREACH3
     if crossing:
         bits |= FLAG.IN_CROSSING

@@ -65,17 +65,17 @@ def place_obstacles(obstacles: ObstacleTable, roads: RoadTable, nets: Ints) -> O
     start: list[int] = [0]
     parts: list[Any] = []
     for b, net in enumerate(nets):
-        own = slice(int(obstacles.off[b]), int(obstacles.off[b + 1]))
-        if own.start == own.stop:
+        span = slice(int(obstacles.off[b]), int(obstacles.off[b + 1]))
+        if span.start == span.stop:
             base.append(-1)
             continue
         base.append(len(start) - 1)
         for row in range(int(roads.seg_off[net]), int(roads.seg_off[net + 1])):
             half_width = float(roads.half_width[net])
             if roads.segment[row].piece >= 0:
-                beside = on_bend(obstacles.parts[own], roads, row, half_width)
+                beside = on_bend(obstacles.parts[span], roads, row, half_width)
             else:
-                part, reaches = _on_segment(obstacles.parts[own], roads.segment[row], half_width)
+                part, reaches = _on_segment(obstacles.parts[span], roads.segment[row], half_width)
                 beside = part[reaches]
             parts.append(beside)
             start.append(start[-1] + len(beside))
@@ -92,10 +92,10 @@ def on_bend(parts: Rows[Part], roads: RoadTable, row: int, half_width: float) ->
 
     Norm: docs/rules.md#obstacle-on-a-bend.
     """
-    own, found, beside = roads.segment[row], list[tuple[float, ...]](), set[int]()
+    segment, found, beside = roads.segment[row], list[tuple[float, ...]](), set[int]()
     for p in range(len(parts)):
         edge = half_width + parts[p].reach
-        if bent_distance2(roads.piece, own, parts[p].x, parts[p].y) < edge * edge:
+        if bent_distance2(roads.piece, segment, parts[p].x, parts[p].y) < edge * edge:
             beside.add(parts[p].owner)
     for p in range(len(parts)):
         if parts[p].owner in beside:
@@ -108,9 +108,9 @@ def on_bend(parts: Rows[Part], roads: RoadTable, row: int, half_width: float) ->
 
 def _bits(part: Part, roads: RoadTable, row: int, half_width: float) -> list[tuple[float, ...]]:
     """Return the pieces of one part beside a segment that bends, each as the fields of an `ObstaclePart`."""
-    own, length = roads.segment[row], roads.segment[row].length
+    segment, length = roads.segment[row], roads.segment[row].length
     if part.half_length == 0.0:
-        along, left = bent_coordinates(roads.piece, own, False, part.x, part.y)
+        along, left = bent_coordinates(roads.piece, segment, False, part.x, part.y)
         beside = along + part.rounding >= 0.0 and along - part.rounding <= length
         return [(along, left, along, left, part.rounding, part.owner)] if beside else []
     count = max(1, ceil(2.0 * part.half_length / STEP - 1e-9))
@@ -118,14 +118,12 @@ def _bits(part: Part, roads: RoadTable, row: int, half_width: float) -> list[tup
     for k in range(count + 1):
         gone = (2.0 * k / count - 1.0) * part.half_length
         x, y = part.x + gone * part.c, part.y + gone * part.s
-        along, left = bent_coordinates(roads.piece, own, False, x, y)
+        along, left = bent_coordinates(roads.piece, segment, False, x, y)
         spots.append((along, min(max(left, -half_width), half_width)))
     return [
         (s0, l0, s1, l1, 0.0, part.owner)
         for (s0, l0), (s1, l1) in pairwise(spots)
-        if max(s0, s1) >= 0.0
-        and min(s0, s1) <= length
-        and (abs(s1 - s0) <= LEAP or min(abs(l0), abs(l1)) < half_width)
+        if max(s0, s1) >= 0.0 and min(s0, s1) <= length and (abs(s1 - s0) <= LEAP or min(abs(l0), abs(l1)) < half_width)
     ]
 
 
@@ -145,7 +143,7 @@ def _on_segment(parts: Rows[Part], segment: Segment, half_width: float) -> tuple
     right, left = ends[1].min(axis=0) - rounding, ends[1].max(axis=0) + rounding
     reaches = (end >= 0.0) & (begin <= segment.length)
     for number in np.unique(owner[reaches]):
-        own = reaches & (owner == number)
-        if left[own].max() <= -half_width or right[own].min() >= half_width:
-            reaches[own] = False
+        there = reaches & (owner == number)
+        if left[there].max() <= -half_width or right[there].min() >= half_width:
+            reaches[there] = False
     return rows, reaches

@@ -16,7 +16,7 @@ RIGHT: float = 1e-9
 
 
 @jit
-def foremost(n: int, first: int, cars: Rows[CarMemory], own: TrialRules) -> bool:
+def foremost(n: int, first: int, cars: Rows[CarMemory], rules: TrialRules) -> bool:
     """Tell whether car n is foremost: no car of its lane with larger progress has its body outside the disc ahead.
 
     `cars` (N,) are those of the trial; the list of those in the lane begins with car `first` (index, -1: none).
@@ -25,7 +25,7 @@ def foremost(n: int, first: int, cars: Rows[CarMemory], own: TrialRules) -> bool
     k = first
     while k >= 0:
         other = cars[k]
-        if other.progress > progress and other.gap2 >= own.cross2:
+        if other.progress > progress and other.gap2 >= rules.cross2:
             return False
         k = other.next_in_lane
     return True
@@ -152,7 +152,7 @@ def _yields(t: RoadTable, net: int, queue: Queue, n: int) -> bool:
 
 
 @jit
-def keep_order(t: RoadTable, own: TrialRules, queue: Queue, clear: bool, tick: int) -> None:
+def keep_order(t: RoadTable, rules: TrialRules, queue: Queue, clear: bool, tick: int) -> None:
     """Order a queue; a member that forfeits its place gets the present tick as its new ticket.
 
     `clear` (bool) tells whether no car crosses the vertex.
@@ -160,14 +160,14 @@ def keep_order(t: RoadTable, own: TrialRules, queue: Queue, clear: bool, tick: i
     Norm: docs/rules.md#forfeit.
     """
     cars = queue.cars
-    front = rank_queue(t, own.net, queue, own.group_ticks)
+    front = rank_queue(t, rules.net, queue, rules.group_ticks)
     first = cars[front]
     since = first.first_since
-    if clear and since >= 0 and tick - since >= own.forfeit_ticks:
+    if clear and since >= 0 and tick - since >= rules.forfeit_ticks:
         first.ticket = tick
         first.forfeits += 1
         first.first_since = -1
-        front = rank_queue(t, own.net, queue, own.group_ticks)
+        front = rank_queue(t, rules.net, queue, rules.group_ticks)
     for k in range(queue.count):
         n: int = queue.members[k]
         if n != front or not clear:

@@ -116,9 +116,7 @@ class Referee:
         self._judge(0, state)
         return self._collect(state, [()] * trials)
 
-    def update(
-        self, tick: int, state: State, contacts: Sequence[Sequence[Contact]]
-    ) -> Sequence[Sequence[Breach]]:
+    def update(self, tick: int, state: State, contacts: Sequence[Sequence[Contact]]) -> Sequence[Sequence[Breach]]:
         """Judge frame `tick`, one after the last; return the breaches that begin in it, of each trial, in order.
 
         Parameters
@@ -149,9 +147,7 @@ class Referee:
             If the referee judges a batch or was given a labeller, or frames have been left out.
         """
         if not self._own or len(self._judged) != 1:
-            raise ValueError(
-                "judge() takes the frames of one trial, and only from a referee without a labeller"
-            )
+            raise ValueError("judge() takes the frames of one trial, and only from a referee without a labeller")
         if not len(frames):
             return [], frames.contacts
         before, bits, breaches = self._block(frames)
@@ -207,10 +203,10 @@ class Referee:
     def tables(self, state: State) -> RefereeTables:
         """Return the tables by which the last frame was judged, that of `state`; they must not be changed."""
         if self._tables is None or self._tables.state is not state:
-            own = self._labeller
+            labeller = self._labeller
             self._tables = RefereeTables(
-                state, self._roads, self._obstacles, self._rules, self._terms, own.labels, own.memory, self._log,
-                self._spacing,
+                state, self._roads, self._obstacles, self._rules, self._terms, labeller.labels, labeller.memory,
+                self._log, self._spacing,
             )  # fmt: skip
         return self._tables
 
@@ -226,36 +222,34 @@ class Referee:
             b, n = int(row.trial), int(row.car)
             by_trial.setdefault(b, []).append(breach_of(row, float(state.x[b, n]), float(state.y[b, n])))
         self._log.filled[0] = 0
-        for b, own in enumerate(contacts):
-            if own and self._judged[b]:
-                by_trial.setdefault(b, []).extend(accused(own))
+        for b, touched in enumerate(contacts):
+            if touched and self._judged[b]:
+                by_trial.setdefault(b, []).extend(accused(touched))
         breaches: list[Sequence[Breach]] = [()] * len(self._judged)
-        for b, own in by_trial.items():
-            breaches[b] = sorted(own, key=order)
+        for b, touched in by_trial.items():
+            breaches[b] = sorted(touched, key=order)
         return breaches
 
     def _block(self, frames: Frames) -> tuple[Bits, Bits, list[Breach]]:
         """Label and judge a block; return the flags of the frame before it, of its frames, and the breaches."""
         cars = frames.x.shape[1]
-        own = self._labeller
+        labeller = self._labeller
         if frames.first == 0:
             self._state = State.zeros(1, cars)
             self._log = BreachLog.empty(1, cars, self._goals, _ROOMY)
             self._spacing = unknown_spacing(1, cars)
             self._next = 0
-            own.begin(1, cars)
+            labeller.begin(1, cars)
             self._tables = None
         if self._state is None or frames.first != self._next:
-            raise ValueError(
-                f"frames must follow one another: got a block from frame {frames.first} on before frame 0"
-            )
+            raise ValueError(f"frames must follow one another: got a block from frame {frames.first} on before frame 0")
         self._next += len(frames)
         poses, _ = frames.states
-        before = own.labels.bits[0].copy()
+        before = labeller.labels.bits[0].copy()
         bits = np.zeros(frames.x.shape, dtype=np.uint32)
         breaches: list[Breach] = []
         room = self._log.room_of_a_frame
-        labelling, judging = own.seeing(self._state), self.tables(self._state)
+        labelling, judging = labeller.seeing(self._state), self.tables(self._state)
         done = 0
         while done < len(frames):
             done = judge_frames(frames.first, done, room, poses, bits, labelling, judging)
@@ -319,10 +313,10 @@ def _named(runs: Sequence[bool]) -> frozenset[str]:
     return frozenset(rule for (rule, _), run in zip(PENDING, runs, strict=True) if run)
 
 
-def breach_of(found: FoundBreach, x: float, y: float) -> Breach:
+def breach_of(row: FoundBreach, x: float, y: float) -> Breach:
     """Return a row of the log as a Breach by a car at (x, y)."""
-    car, tick, since = int(found.car), int(found.tick), int(found.since)
-    return Breach(RULES[found.rule], car, tick, since, x, y, int(found.vertex), int(found.lane))
+    car, tick, since = int(row.car), int(row.tick), int(row.since)
+    return Breach(RULES[row.rule], car, tick, since, x, y, int(row.vertex), int(row.lane))
 
 
 def accused(contacts: Sequence[Contact]) -> list[Breach]:

@@ -81,9 +81,7 @@ def _list_due(b: int, tick: int, cars: int, labels: Labels, memory: Memory, log:
 
 
 @jit_look
-def _is_as_before(
-    b: int, n: int, tick: int, joined: bool, car: JudgedCar, labels: Labels, memory: Memory
-) -> bool:
+def _is_as_before(b: int, n: int, tick: int, joined: bool, car: JudgedCar, labels: Labels, memory: Memory) -> bool:
     """Tell whether a car need not be judged: no label has changed, it has no new ticket, it is not due nor `joined`.
 
     `joined` tells whether the car is in a disc and the ego has come into a disc or left one.
@@ -97,13 +95,13 @@ def _is_as_before(
 @jit_inline
 def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
     """Judge car n, and set `JudgedCar.due`, the tick in which it has to be judged again."""
-    labels, log, own = tables.labels, tables.log, tables.rules[b]
+    labels, log, rules = tables.labels, tables.log, tables.rules[b]
     car = log.car[b, n]
     bits = np.int64(labels.bits[b, n])
     lane = labels.lane[b, n]
     v = labels.crosses[b, n]
     due = tick + 1 if bits & FLAG.LEFT != 0 else NEVER_DUE
-    if _surely_left(bits, tables.memory.car[b, n].reach, car.left_since >= 0, own):
+    if _surely_left(bits, tables.memory.car[b, n].reach, car.left_since >= 0, rules):
         judge_lane(car, bits, lane, tick, tables.terms[b], log)
     else:
         car.left_since = -1
@@ -113,7 +111,7 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
     if bits & ENTERS_CROSSING == ENTERS_CROSSING:
         stopped = False
         if car.bits & FLAG.STOPPED != 0:
-            stopped = lane_end(tables.roads, own.net, car.lane) == v
+            stopped = lane_end(tables.roads, rules.net, car.lane) == v
         _judge_entry(b, n, tick, v, stopped, tables)
     on = bits & FLAG.ON_ROAD != 0
     if not on and car.off_road == -1 and _by_the_road(b, n, tables):
@@ -127,9 +125,9 @@ def _judge_car(b: int, n: int, tick: int, tables: RefereeTables) -> None:
 
 
 @jit_inline
-def _surely_left(bits: Any, reach: float, was: bool, own: TrialRules) -> bool:
+def _surely_left(bits: Any, reach: float, was: bool, rules: TrialRules) -> bool:
     """Tell whether a car is left by limits eased by GRAIN in its favour; `was`: it was left in the frame before."""
-    limit = own.left_release if was else own.left_set
+    limit = rules.left_release if was else rules.left_set
     return bits & FLAG.LEFT != 0 and (reach >= limit + GRAIN if was else reach > limit + GRAIN)
 
 

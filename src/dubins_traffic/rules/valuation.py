@@ -101,7 +101,7 @@ class Valuation:
         judged = any(proposition.word in OF_JUDGED for proposition in self._wanted)
         self._referee = Referee([instance], self._labeller) if judged else None
         self._asks_for_ways = any(proposition.word == "way" for proposition in self._wanted)
-        self._visits = {own: visited_place(own.place) for own in self._wanted if own.word == VISIT}
+        self._visits = {wanted: visited_place(wanted.place) for wanted in self._wanted if wanted.word == VISIT}
         self._exceptions = Exceptions(self._rules, problem.rate)
         network = problem.network
         self._ends = np.array([network.lane_ends(lane)[1] for lane in range(network.lanes)] + [-1])
@@ -134,8 +134,8 @@ class Valuation:
             tick = frames.first + row
             for name in ("x", "y", "c", "s"):
                 getattr(self._state, name)[0] = getattr(frames, name)[row]
-            own = self._label(tick, contacts.get(tick, []))
-            self._note(scene, row, tick, own)
+            of_labels = self._label(tick, contacts.get(tick, []))
+            self._note(scene, row, tick, of_labels)
         return scene
 
     def _label(self, tick: int, contacts: Sequence[Contact]) -> Sequence[Contact]:

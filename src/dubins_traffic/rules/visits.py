@@ -96,11 +96,11 @@ def visited_place(vertex: int) -> Rows[VisitedPlace]:
 @jit
 def mark_visits(at: Ints, place: Rows[VisitedPlace], found: Ints) -> None:
     """Write to `found` (F,) 1 for each frame in which a visit begins; `at` (F,) are the discs that hold the centre."""
-    own = place[0]
+    first = place[0]
     for f in range(at.shape[0]):
         if at[f] >= 0:
-            come_by(at[f], own)
-        found[f] = 1 if begins_visit(at[f] == own.vertex, own) else 0
+            come_by(at[f], first)
+        found[f] = 1 if begins_visit(at[f] == first.vertex, first) else 0
 
 
 def visits_in(at: Ints, place: Rows[VisitedPlace]) -> Ints:

@@ -26,9 +26,7 @@ def find_waiting(b: int, tick: int, tables: RefereeTables) -> None:
     while grows:
         grows = False
         for n in range(EGO + 1, cars):
-            if log.car[b, n].waits == 0 and (
-                _waits_in_lane(b, n, tables) or _waits_in_disc(b, n, tick, tables)
-            ):
+            if log.car[b, n].waits == 0 and (_waits_in_lane(b, n, tables) or _waits_in_disc(b, n, tick, tables)):
                 log.car[b, n].waits = 1
                 grows = True
 
@@ -47,11 +45,7 @@ def _waits_in_lane(b: int, n: int, tables: RefereeTables) -> bool:
         if k == n or tables.log.car[b, k].waits == 0:
             continue
         ahead = labels.lane[b, k] == lane and 0.0 < row[k].progress - here <= far
-        if (
-            ahead
-            or (arrives and labels.crosses[b, k] == v)
-            or (blocked and labels.segment[b, k] == lane // 2)
-        ):
+        if ahead or (arrives and labels.crosses[b, k] == v) or (blocked and labels.segment[b, k] == lane // 2):
             return True
     return False
 
@@ -59,12 +53,12 @@ def _waits_in_lane(b: int, n: int, tables: RefereeTables) -> bool:
 @jit
 def _waits_in_disc(b: int, n: int, tick: int, tables: RefereeTables) -> bool:
     """Tell whether car n is in a disc without a free exit, and a car that waits for the ego is there or takes one."""
-    labels, roads, own = tables.labels, tables.roads, tables.rules[b]
+    labels, roads, rules = tables.labels, tables.roads, tables.rules[b]
     v: int = labels.crosses[b, n]
     if v < 0:
         return False
-    back = way_back(v, tables.log.car[b, n].came_by, roads, own)
-    row = int(roads.vert_off[own.net]) + v
+    back = way_back(v, tables.log.car[b, n].came_by, roads, rules)
+    row = int(roads.vert_off[rules.net]) + v
     only = lane_taken(b, n, v, tables)
     exits = 0
     for arm in range(roads.degree[row]):

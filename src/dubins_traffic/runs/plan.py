@@ -139,8 +139,8 @@ def plan(
     InputError
         If an argument or the source is wrong; nothing has been written then.
     """
-    found = load_runnable(source, rnd=rnd, seed=seed or 0)
-    recorded = found.controller if isinstance(found, Record) else None
+    runnable = load_runnable(source, rnd=rnd, seed=seed or 0)
+    recorded = runnable.controller if isinstance(runnable, Record) else None
     named = (recorded or DEFAULT_CONTROLLER) if controller is None else controller
     controller = controllers.dressed(named, shield=shield, sandbox=sandbox)
     controllers.load(controller)
@@ -148,14 +148,14 @@ def plan(
     _check_deadline(deadline)
     check_choice(records, data, overwrite=overwrite, append=append)
     configuration = None
-    if isinstance(found, Configuration):
-        configuration = found if simulator is None else found.with_simulator(simulator)
-        count = found.number_trials if trials is None else trials
+    if isinstance(runnable, Configuration):
+        configuration = runnable if simulator is None else runnable.with_simulator(simulator)
+        count = runnable.number_trials if trials is None else trials
         _check_count(count, repeat)
         jobs = _drawn(configuration, controller, count, seed or 0)
     else:
         _check_count(1, repeat)
-        given = found.instance if isinstance(found, Record) else found
+        given = runnable.instance if isinstance(runnable, Record) else runnable
         other_seed = None if seed == given.seed else seed
         _refuse(os.fspath(source), {"--trials": trials, "--seed": other_seed, "-f": data})
         instance = replace(given, simulator=simulator or given.simulator)
@@ -253,9 +253,7 @@ def check_simulator(source: str, name: str, *, show: bool = False) -> None:
 def _check_count(trials: int, repeat: int) -> None:
     if trials < 1 or repeat < 1 or trials * repeat > MOST_RUNS:
         expected = f"both at least 1, and at most {MOST_RUNS} runs in all"
-        raise InputError(
-            "not a number of runs", file="--trials, --repeat", value=(trials, repeat), expected=expected
-        )
+        raise InputError("not a number of runs", file="--trials, --repeat", value=(trials, repeat), expected=expected)
 
 
 def _check_deadline(deadline: float | None) -> None:

@@ -53,9 +53,7 @@ def check_folder(folder: str | os.PathLike[str]) -> Path:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise InputError(
-            f"can't hold records ({error.strerror})", file=str(path), expected=expected
-        ) from None
+        raise InputError(f"can't hold records ({error.strerror})", file=str(path), expected=expected) from None
     if not os.access(path, os.W_OK | os.X_OK, effective_ids=os.access in os.supports_effective_ids):
         raise InputError("no permission to write", file=str(path), expected=expected)
     return path

@@ -82,9 +82,7 @@ class Trial(BareTrial):
             linked=link is not None,
         )
 
-    def fork(
-        self, seed: int | None = None, *, record: Path | str | None = None, overwrite: bool = False
-    ) -> Self:
+    def fork(self, seed: int | None = None, *, record: Path | str | None = None, overwrite: bool = False) -> Self:
         """Return an independent copy of this trial at its present frame.
 
         Given the same commands both go on equally to the bit, whichever is stepped first. The fork has no controller:
@@ -145,9 +143,7 @@ class Trial(BareTrial):
         """Return the writer of this trial's record; InputError if there is none, or a fork's seed differs."""
         writers = [sink for sink in self.sinks if isinstance(sink, RecordWriter)]
         if not writers:
-            raise InputError(
-                "this trial has no record to continue", field="record", expected="a trial with a record"
-            )
+            raise InputError("this trial has no record to continue", field="record", expected="a trial with a record")
         if seed not in (None, self.instance.seed):
             raise InputError(
                 "a fork with another seed can't have a record",
@@ -191,8 +187,8 @@ class Result(Tabulated):
         return f"<Result: {self.instance.title}, {self.score.summary}{record}>"
 
     def _repr_html_(self) -> str:
-        own = self.paths or Paths()
-        return trial_html(self.instance, self.score, own.lines(), own.last)
+        paths = self.paths or Paths()
+        return trial_html(self.instance, self.score, paths.lines(), paths.last)
 
     def asdict(self) -> dict[str, Any]:
         """Return the score as one element of ``trials`` in ``run --json``."""

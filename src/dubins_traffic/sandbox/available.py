@@ -24,9 +24,7 @@ def available_layers() -> Layers:
     why = _why_no_box()
     folders = cgroups.trees().folders
     absent = [
-        name
-        for name, tree in ((MEMORY, "memory"), (PROCESSES, "pids"), (CLOCK, "cpuacct"))
-        if tree not in folders
+        name for name, tree in ((MEMORY, "memory"), (PROCESSES, "pids"), (CLOCK, "cpuacct")) if tree not in folders
     ]
     if seccomp.binding() is None:
         absent.append(SECCOMP)
@@ -77,9 +75,7 @@ def _why_no_box() -> str:
         launch.Program(("/bin/true",)), Limits(), Layers().without(RLIMITS), doors=(), seccomp=-1
     )
     try:
-        done = subprocess.run(
-            command, stdin=subprocess.DEVNULL, capture_output=True, timeout=WAIT, check=False
-        )
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, timeout=WAIT, check=False)
     except (OSError, subprocess.TimeoutExpired) as error:
         return shown(str(error), 200)
     lines = done.stderr.decode(errors="replace").strip().splitlines()

@@ -172,9 +172,7 @@ class Box:
         except BlockingIOError:
             return unsent
         except OSError:
-            return unsent[
-                len(unsent) :
-            ]  # it reads no more; what it says at last, and that it has gone, is read
+            return unsent[len(unsent) :]  # it reads no more; what it says at last, and that it has gone, is read
 
     def _wait(self, *, writing: bool) -> bool:
         """Wait a little for something to read; return whether there is something of an answer."""

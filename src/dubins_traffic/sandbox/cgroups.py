@@ -138,9 +138,7 @@ def _first_version() -> Trees:
 
 def _second_version() -> Trees:
     root = Path("/sys/fs/cgroup")
-    path = next(
-        (line.split(":", 2)[2] for line in _lines("/proc/self/cgroup") if line.startswith("0:")), None
-    )
+    path = next((line.split(":", 2)[2] for line in _lines("/proc/self/cgroup") if line.startswith("0:")), None)
     if path is None or not (root / "cgroup.controllers").is_file():
         return Trees(2)
     here = root / path.lstrip("/")

@@ -56,9 +56,7 @@ class BoxedController:
 
     def __deepcopy__(self, memo: object) -> Self:
         """Refuse: a program drives in one trial at a time."""
-        raise InputError(
-            "a controller in a box can't go on in two trials", field="controller", expected="one of ours"
-        )
+        raise InputError("a controller in a box can't go on in two trials", field="controller", expected="one of ours")
 
     def start(self, problem: Problem) -> None:
         """Begin a box and tell its program the problem."""

@@ -62,9 +62,7 @@ class Driving:
         seen = observation_from_document(document, self._problem)
         self._tick = seen.tick
         command = self._controller.act(seen)
-        made_reports = (
-            checked_reports(self._controller.report()) if isinstance(self._controller, Reports) else []
-        )
+        made_reports = checked_reports(self._controller.report()) if isinstance(self._controller, Reports) else []
         if command is None:
             return {"bye": f"the controller gave up at tick {seen.tick}"}
         reports = {"reports": made_reports} if made_reports else {}

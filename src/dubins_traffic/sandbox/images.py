@@ -262,9 +262,7 @@ def _extract(source: Path, root: Path) -> None:
             place.mkdir()
     if (root / "etc").is_symlink():
         raise InputError("/etc is a link", expected="a folder /etc, or none")
-    (root / "etc" / "ld.so.preload").unlink(
-        missing_ok=True
-    )  # what it names would run before the limits are set
+    (root / "etc" / "ld.so.preload").unlink(missing_ok=True)  # what it names would run before the limits are set
 
 
 def _kept(member: tarfile.TarInfo, root: str) -> tarfile.TarInfo | None:

@@ -79,6 +79,4 @@ class Layers:
         """
         missing = self.missing()
         if missing:
-            raise InputError(
-                "; ".join(missing), file="--sandbox", expected=f"{INSTALL}; or --trust-submissions"
-            )
+            raise InputError("; ".join(missing), file="--sandbox", expected=f"{INSTALL}; or --trust-submissions")

@@ -52,9 +52,7 @@ class Limits:
             least = 0.0 if each.name == "bank_seconds" else math.nextafter(0.0, 1.0)
             if not fits or not least <= float(str(value)) < math.inf:
                 expected = "a whole number > 0" if whole else "a number > 0"
-                raise InputError(
-                    "not a limit", file="--limits", field=each.name, value=value, expected=expected
-                )
+                raise InputError("not a limit", file="--limits", field=each.name, value=value, expected=expected)
 
     @property
     def most_files(self) -> int:
@@ -75,9 +73,7 @@ class Limits:
         for part in filter(None, text.split(",")):
             name, _, value = part.partition("=")
             if name not in kinds:
-                raise InputError(
-                    "no such limit", file="--limits", value=name, expected=f"one of {', '.join(kinds)}"
-                )
+                raise InputError("no such limit", file="--limits", value=name, expected=f"one of {', '.join(kinds)}")
             given[name] = _number(name, value, whole=kinds[name] == "int")
         return cls(**given)  # pyright: ignore[reportArgumentType]  # whole where it must be
 

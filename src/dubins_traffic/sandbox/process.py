@@ -215,9 +215,7 @@ class Processes:
         self._timed = group if CLOCK in self._layers and group is not None and group.has_clock else None
         rules = b""
         if SECCOMP in self._layers:
-            rules = seccomp.program(
-                counts_children=self._timed is None, counts_buffers=MEMORY not in self._layers
-            )
+            rules = seccomp.program(counts_children=self._timed is None, counts_buffers=MEMORY not in self._layers)
         doors = () if group is None else group.doors
         with _piped(rules) as source:
             line = command_line(
@@ -255,13 +253,13 @@ class Processes:
 
     def _file_bytes(self) -> int:
         """Return how many bytes the box's own files take, which lie in memory; 0 where that can't be seen."""
-        own = self._filesystem()
-        return 0 if own is None else (own.f_blocks - own.f_bfree) * own.f_frsize
+        filesystem = self._filesystem()
+        return 0 if filesystem is None else (filesystem.f_blocks - filesystem.f_bfree) * filesystem.f_frsize
 
     def files(self) -> int:
         """Return how many files the box has of its own, 0 where that can't be seen."""
-        own = self._filesystem()
-        return 0 if own is None else own.f_files - own.f_ffree
+        filesystem = self._filesystem()
+        return 0 if filesystem is None else filesystem.f_files - filesystem.f_ffree
 
     def _filesystem(self) -> os.statvfs_result | None:
         """Return what there is where the box has its own files."""

@@ -92,18 +92,14 @@ def _folder(folder: Path) -> Program:
     try:
         document = tomllib.loads(manifest.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(
-            f"can't be read: {error}", file=str(manifest), expected="a manifest in TOML"
-        ) from error
+        raise InputError(f"can't be read: {error}", file=str(manifest), expected="a manifest in TOML") from error
     shown = Shown(str(folder), PLACE, own=True)
     match document:
         case {"python": str(spec)} if len(document) == 1 and outside.is_place(spec):
             place, _, name = spec.rpartition(":")
             inside = f"{PLACE}/{place}:{name}" if place.endswith(".py") else spec
             return _python(inside, shown, paths=(PLACE,))
-        case {"program": [str(first), *rest]} if len(document) == 1 and all(
-            isinstance(word, str) for word in rest
-        ):
+        case {"program": [str(first), *rest]} if len(document) == 1 and all(isinstance(word, str) for word in rest):
             inside = f"{PLACE}/{first.removeprefix('./')}" if "/" in first else first
             return Program((inside, *map(str, rest)), (shown,), ONE_THREAD)
         case {"image": str(name), **rest} if set(rest) <= {"program"}:
@@ -120,13 +116,9 @@ def _image(archive: Path, program: object) -> Program:
             "no such file", file=MANIFEST, field="image", value=archive.name, expected="an archive beside it"
         )
     image = images.unpacked(archive)
-    words = (
-        [str(word) for word in cast("list[object]", program)] if isinstance(program, list) else image.command
-    )
+    words = [str(word) for word in cast("list[object]", program)] if isinstance(program, list) else image.command
     if not words:
-        raise InputError(
-            "the image runs nothing", file=MANIFEST, field="program", expected='program = ["/drive"]'
-        )
+        raise InputError("the image runs nothing", file=MANIFEST, field="program", expected='program = ["/drive"]')
     root = Shown(image.root, "/")
     environment = {**image.environment, **ONE_THREAD}
     return Program(tuple(words), (root,), environment, image=True, folder=image.folder)
@@ -194,7 +186,5 @@ def interpreter() -> tuple[str, tuple[Shown, ...], tuple[str, ...]]:
 def _packages() -> list[Path]:
     """Return the folders with packages that this interpreter looks in, that of numpy among them."""
     numpys = Path(numpy.__file__).resolve().parents[1]
-    places = [
-        Path(place).resolve() for place in sys.path if place.endswith(("site-packages", "dist-packages"))
-    ]
+    places = [Path(place).resolve() for place in sys.path if place.endswith(("site-packages", "dist-packages"))]
     return list(dict.fromkeys([numpys, *(place for place in places if place.is_dir())]))

@@ -82,9 +82,7 @@ class Baits:
     def _begin_process(self) -> None:
         code = "import sys; sys.stdin.read()"
         words = [sys.executable, "-I", "-S", "-c", code, self.secret]
-        self.process = subprocess.Popen(
-            words, stdin=subprocess.PIPE, env={**os.environ, VARIABLE: self.secret}
-        )
+        self.process = subprocess.Popen(words, stdin=subprocess.PIPE, env={**os.environ, VARIABLE: self.secret})
         self._held.callback(self._end_process)
 
     def _end_process(self) -> None:

@@ -32,9 +32,7 @@ def joined(blocks: Sequence[Frames]) -> Frames:
     first = blocks[0]
     if len(blocks) == 1:
         return first
-    arrays: dict[str, Any] = {
-        name: np.concatenate([getattr(block, name) for block in blocks]) for name in _ARRAYS
-    }
+    arrays: dict[str, Any] = {name: np.concatenate([getattr(block, name) for block in blocks]) for name in _ARRAYS}
     contacts = tuple(contact for block in blocks for contact in block.contacts)
     events = tuple(event for block in blocks for event in block.events)
     return Frames(first.first, first.rate, **arrays, contacts=contacts, events=events)
@@ -85,6 +83,6 @@ def cut(frames: Frames, begin: int, end: int) -> Frames:
     arrays: dict[str, Any] = {name: np.array(getattr(frames, name)[begin:end], order="C") for name in _ARRAYS}
     for array in arrays.values():
         array.flags.writeable = False
-    contacts = tuple(own for own in frames.contacts if low <= own.tick < high)
-    events = tuple(own for own in frames.events if low <= own.tick < high)
+    contacts = tuple(contact for contact in frames.contacts if low <= contact.tick < high)
+    events = tuple(event for event in frames.events if low <= event.tick < high)
     return Frames(frames.first + begin, frames.rate, **arrays, contacts=contacts, events=events)

@@ -39,7 +39,7 @@ class Collision:
 
 def collisions_of(names: Sequence[str], contacts: Sequence[Contact]) -> tuple[tuple[Collision, ...], int]:
     """Return the collisions of the ego among `contacts`, in their order, and the number of those among others."""
-    found: list[Collision] = []
+    collisions: list[Collision] = []
     for contact in contacts:
         if EGO not in (contact.car, contact.other):
             continue
@@ -48,8 +48,8 @@ def collisions_of(names: Sequence[str], contacts: Sequence[Contact]) -> tuple[tu
         if other == EGO:
             other, fault, partner_fault = contact.car, partner_fault, fault
         partner = names[other] if other >= 0 else f"obstacle {-1 - other}"
-        found.append(Collision(contact.time, contact.tick, names[EGO], partner, fault, partner_fault))
-    return tuple(found), len(contacts) - len(found)
+        collisions.append(Collision(contact.time, contact.tick, names[EGO], partner, fault, partner_fault))
+    return tuple(collisions), len(contacts) - len(collisions)
 
 
 def _faults(collisions: Sequence[Collision], *, ego: bool, other: bool) -> int:

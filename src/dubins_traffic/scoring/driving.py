@@ -51,9 +51,7 @@ COLUMNS = (
     ScoreColumn(Column("distance_m", "distance", "m"), lambda score: score.driven.distance_m),
     ScoreColumn(Column("standing_share", "standing", "share", -1), lambda score: score.driven.standing_share),
     ScoreColumn(Column("off_road_s", "off the road", "s", -1), lambda score: score.driven.off_road_s),
-    ScoreColumn(
-        Column("off_road_share", "off the road", "share", -1), lambda score: score.driven.off_road_share
-    ),
+    ScoreColumn(Column("off_road_share", "off the road", "share", -1), lambda score: score.driven.off_road_share),
     ScoreColumn(
         Column("lane_departures", "lane departures", "", -1, "int32"),
         lambda score: score.driven.lane_departures,

@@ -29,11 +29,7 @@ def ran_whole(instance: Instance, ending: Ending | None, last: int) -> bool:
     last : int
         Number of the last frame that there is.
     """
-    return (
-        ending is not None
-        and ending.end is End.DURATION
-        and min(ending.ticks, last) >= planned_ticks(instance)
-    )
+    return ending is not None and ending.end is End.DURATION and min(ending.ticks, last) >= planned_ticks(instance)
 
 
 def early_rounds(early: RoundCount, goals: int, ending: Ending | None) -> float:
@@ -47,7 +43,5 @@ def early_rounds(early: RoundCount, goals: int, ending: Ending | None) -> float:
 
 COLUMNS = (
     ScoreColumn(Column("duration_s", "duration", "s"), lambda score: score.duration_s),
-    ScoreColumn(
-        Column("counted_rounds", "counted rounds", "", 1, "int32"), lambda score: score.counted_rounds
-    ),
+    ScoreColumn(Column("counted_rounds", "counted rounds", "", 1, "int32"), lambda score: score.counted_rounds),
 )

@@ -118,9 +118,7 @@ class FormulaVerdicts:
         if self._valuation is None:
             return ()
         signals = self._signals.result()
-        found = zip(
-            self._texts.items(), self._monitors.verdicts[0].tolist(), self._since.tolist(), strict=True
-        )
+        found = zip(self._texts.items(), self._monitors.verdicts[0].tolist(), self._since.tolist(), strict=True)
         return tuple(
             FormulaVerdict(
                 name,

@@ -74,7 +74,5 @@ def icra2016_of(instance: Instance, counts: TrialCounts, rounds: int, samples: i
 
 
 COLUMNS = (
-    ScoreColumn(
-        Column("icra2016", "ICRA 2016, counts samples", "", 1, bounded=True), lambda score: score.icra2016
-    ),
+    ScoreColumn(Column("icra2016", "ICRA 2016, counts samples", "", 1, bounded=True), lambda score: score.icra2016),
 )

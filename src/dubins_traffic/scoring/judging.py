@@ -97,15 +97,13 @@ class Judging:
         if not len(frames):
             return
         hits = [contact.tick for contact in contacts if EGO in (contact.car, contact.other)]
-        own = [breach.tick for breach in breaches if breach.car == EGO]
+        of_ego = [breach.tick for breach in breaches if breach.car == EGO]
         if hits:
             self._counted.tally.trial[0].clearance = 0.0
-        self._seal = min([self._seal, *hits, *own])
+        self._seal = min([self._seal, *hits, *of_ego])
         seen = self._counts(frames)
         self._seen.update(
-            (one.car, one.tick)
-            for one in breaches
-            if one.car != EGO and seen[one.tick - frames.first, one.car]
+            (one.car, one.tick) for one in breaches if one.car != EGO and seen[one.tick - frames.first, one.car]
         )
         self._last = frames.first + len(frames) - 1
 

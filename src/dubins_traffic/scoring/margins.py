@@ -111,9 +111,9 @@ def margin_rules(rules: Sequence[RuleParameters], periods: Sequence[float], inde
 
 @jit
 def find_margins(
-    trials: Ints, frames: Ints, ego: Grid[EgoFrame], nets: Ints, tables: MarginTables, found: Rows[EgoMargins]
+    trials: Ints, frames: Ints, ego: Grid[EgoFrame], nets: Ints, tables: MarginTables, margins: Rows[EgoMargins]
 ) -> None:
-    """Write the margins of some trials into `found` (B,).
+    """Write the margins of some trials into `margins` (B,).
 
     Parameters
     ----------
@@ -125,18 +125,16 @@ def find_margins(
         Number of each trial's road network.
     tables
         The tables of all trials; `signal` has room for the frames of any.
-    found : (B,)
+    margins : (B,)
         The margins, written in place.
     """
     for k in range(trials.shape[0]):
         b: int = trials[k]
-        _find_margin(b, frames[k], ego[b], nets[b], tables, found[b])
+        _find_margin(b, frames[k], ego[b], nets[b], tables, margins[b])
 
 
 @jit
-def _find_margin(
-    b: int, frames: Any, ego: Rows[EgoFrame], net: Any, tables: MarginTables, found: EgoMargins
-) -> None:
+def _find_margin(b: int, frames: Any, ego: Rows[EgoFrame], net: Any, tables: MarginTables, margins: EgoMargins) -> None:
     roads, signal = tables.roads, tables.signal
     half_road = roads.half_width[net]
     begun = False
@@ -144,22 +142,22 @@ def _find_margin(
     segment = 0
     farthest = -1.0
     for f in range(frames):
-        own = ego[f]
-        x, y, bits = own.x, own.y, own.bits
+        here = ego[f]
+        x, y, bits = here.x, here.y, here.bits
         if bits & FLAG.ON_ROAD != 0:
             begun = True
         # The nearest segment is no farther than the one of the frame before, so often none need be searched.
         if begun and distance2(roads, net, segment, x, y) > farthest:
             segment, square = nearest_segment(roads, net, x, y)
             farthest = max(farthest, square)
-        right = -_beyond(b, own, net, tables)
+        right = -_beyond(b, here, net, tables)
         signal[f] = right if bits & FLAG.HEMMED == 0 else INFINITE
         if bits & FLAG.OVERTAKING == 0:
             line = min(line, right)
-    found.road = float(half_road) - sqrt(farthest) if begun else INFINITE
-    found.line = line
-    found.back = _least_of_greatest(signal, frames, tables.rules[b].window)
-    found.turn = _least_way_back(frames, ego, net, tables.rules[b].turn_back, roads)
+    margins.road = float(half_road) - sqrt(farthest) if begun else INFINITE
+    margins.line = line
+    margins.back = _least_of_greatest(signal, frames, tables.rules[b].window)
+    margins.turn = _least_way_back(frames, ego, net, tables.rules[b].turn_back, roads)
 
 
 @jit
@@ -173,26 +171,26 @@ def _least_way_back(frames: Any, ego: Rows[EgoFrame], net: Any, turn_back: float
     before = -1
     overtook = False
     for f in range(frames):
-        own = ego[f]
-        lane = own.lane
+        here = ego[f]
+        lane = here.lane
         if lane >= 0:
-            turned = own.bits & FLAG.TURNED != 0
+            turned = here.bits & FLAG.TURNED != 0
             came = lane ^ 1 if turned else lane
-            progress, _ = lane_coordinates(roads, net, came, own.x, own.y)
+            progress, _ = lane_coordinates(roads, net, came, here.x, here.y)
             if came != before or (not overtook and progress > reference):
                 reference = progress
             least = min(least, turn_back - (reference - progress))
             if turned:
-                reference, _ = lane_coordinates(roads, net, lane, own.x, own.y)
+                reference, _ = lane_coordinates(roads, net, lane, here.x, here.y)
         before = lane
-        overtook = own.bits & FLAG.OVERTAKING != 0
+        overtook = here.bits & FLAG.OVERTAKING != 0
     return least
 
 
 @jit
 def _beyond(b: int, ego: EgoFrame, net: Any, tables: MarginTables) -> Any:
     """Return how far the body reaches over the line at which `left` changes, metres; -inf without lane state."""
-    roads, cars, own = tables.roads, tables.cars, tables.rules[b]
+    roads, cars, rules = tables.roads, tables.cars, tables.rules[b]
     lane = ego.lane
     if lane < 0:
         return -INFINITE
@@ -201,7 +199,7 @@ def _beyond(b: int, ego: EgoFrame, net: Any, tables: MarginTables) -> Any:
     half = half_extent(tx, ty, ego.c, ego.s, body)
     _, lateral = lane_coordinates(roads, net, lane, ego.x, ego.y)
     risen = ego.bits & FLAG.LEFT != 0
-    return lateral + half - (own.left_release if risen else own.left_set)
+    return lateral + half - (rules.left_release if risen else rules.left_set)
 
 
 @jit
@@ -239,7 +237,7 @@ class Judged(Protocol):
         ...
 
 
-def entries_by_rule(found: EntryMargins, period: float) -> dict[str, float | None]:
+def entries_by_rule(margins: EntryMargins, period: float) -> dict[str, float | None]:
     """Return the margins of rule 3 by the rules' names, seconds, seconds and metres; None without an entry that counts.
 
     Parameters
@@ -249,10 +247,8 @@ def entries_by_rule(found: EntryMargins, period: float) -> dict[str, float | Non
     period
         Seconds of a tick.
     """
-    values = (found.stop * period, found.order * period, found.clear)
-    return {
-        rule: value if math.isfinite(value) else None for rule, value in zip(ENTERED, values, strict=True)
-    }
+    values = (margins.stop * period, margins.order * period, margins.clear)
+    return {rule: value if math.isfinite(value) else None for rule, value in zip(ENTERED, values, strict=True)}
 
 
 def margins_of(scores: Iterable[Judged]) -> Floats:
@@ -276,7 +272,7 @@ def _row(score: Judged) -> list[float]:
     verdict = score.verdict
     if verdict is None:
         return [math.inf] * len(MARGINS)
-    broken = {own.rule for own in verdict.violations if own.car == EGO_NAME}
+    broken = {violation.rule for violation in verdict.violations if violation.car == EGO_NAME}
     row: list[float] = []
     for rule in MARGINS[:-1]:
         value = verdict.robustness.get(rule)

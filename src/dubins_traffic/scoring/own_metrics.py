@@ -50,7 +50,7 @@ class OwnMetrics:
             If a metric raises, or its result is not a value of the right kind for each of its columns.
         """
         self._show_rest()
-        return tuple(own for metric in self._metrics for own in _values(metric))
+        return tuple(value for metric in self._metrics for value in _values(metric))
 
     def _show(self, block: Frames) -> None:
         for metric in self._metrics:
@@ -68,9 +68,7 @@ def _guarded(metric: Metric, method: str, *arguments: object) -> Any:
     except DubinsTrafficError:
         raise
     except Exception as error:
-        raise _fault(
-            metric, f"raised {plainly(error)} in {method}", None, "a metric that takes every trial"
-        ) from error
+        raise _fault(metric, f"raised {plainly(error)} in {method}", None, "a metric that takes every trial") from error
 
 
 def _values(metric: Metric) -> list[Measured]:
@@ -91,17 +89,15 @@ def _value(metric: Metric, column: Column, value: Any) -> Value:
     plain = value.item() if hasattr(value, "item") and getattr(value, "shape", None) == () else value
     if plain is None:
         return None
-    own = KINDS[column.kind]
-    fits = isinstance(plain, own) and (column.kind == "bool" or not isinstance(plain, bool))
+    kind = KINDS[column.kind]
+    fits = isinstance(plain, kind) and (column.kind == "bool" or not isinstance(plain, bool))
     if fits and column.kind == "float64":
         plain = float(plain)
         fits = math.isfinite(plain)
     if fits and column.kind in ("int32", "int64"):
         fits = abs(plain) < 2 ** (int(column.kind[3:]) - 1)
     if not fits:
-        raise _fault(
-            metric, f"returns no {column.kind} for {column.name}", value, f"a finite {column.kind}, or None"
-        )
+        raise _fault(metric, f"returns no {column.kind} for {column.name}", value, f"a finite {column.kind}, or None")
     return plain
 
 

@@ -34,10 +34,7 @@ _NAME = re.compile(r"[A-Za-z]\w*", re.ASCII)
 
 def names() -> Mapping[str, str]:
     """Return the metrics of this and other packages: name to one line of description."""
-    return {
-        name: (maker.__doc__ or "").strip().partition("\n")[0].rstrip(".")
-        for name, maker in _registered().items()
-    }
+    return {name: (maker.__doc__ or "").strip().partition("\n")[0].rstrip(".") for name, maker in _registered().items()}
 
 
 def load(spec: MetricSpec) -> Maker:
@@ -68,10 +65,10 @@ def columns(specs: Sequence[MetricSpec], taken: Sequence[str] = ()) -> tuple[Col
     """
     found: dict[str, Column] = {}
     for spec in specs:
-        for own in _columns_of(_maker(spec), spec):
-            if own.name in found or own.name in taken:
-                raise _refuse(spec, f"has a column whose name is taken: {own.name}", "a name of its own")
-            found[own.name] = own
+        for column in _columns_of(_maker(spec), spec):
+            if column.name in found or column.name in taken:
+                raise _refuse(spec, f"has a column whose name is taken: {column.name}", "a name of its own")
+            found[column.name] = column
     return tuple(found.values())
 
 
@@ -84,10 +81,10 @@ def makers(specs: Sequence[MetricSpec]) -> tuple[Maker, ...]:
 
 def with_share(specs: Iterable[Spec], controllers: Iterable[object]) -> tuple[Spec | str, ...]:
     """Return further metrics, and with them `strategy_share` if a controller plays a strategy of another tool."""
-    own = tuple(specs)
-    if STRATEGY_SHARE in own or not any(isinstance(one, str) and plays_foreign(one) for one in controllers):
-        return own
-    return (*own, STRATEGY_SHARE)
+    given = tuple(specs)
+    if STRATEGY_SHARE in given or not any(isinstance(one, str) and plays_foreign(one) for one in controllers):
+        return given
+    return (*given, STRATEGY_SHARE)
 
 
 def forget() -> None:
@@ -98,14 +95,14 @@ def forget() -> None:
 def _columns_of(maker: Maker, spec: MetricSpec) -> tuple[Column, ...]:
     made = outside.make(maker, _called(spec), _SEAM)
     columns: Any = getattr(made, "columns", None)
-    sound = isinstance(columns, list | tuple) and columns and all(isinstance(own, Column) for own in columns)  # pyright: ignore[reportUnknownVariableType]
+    sound = isinstance(columns, list | tuple) and columns and all(isinstance(column, Column) for column in columns)  # pyright: ignore[reportUnknownVariableType]
     if not sound:
         raise _refuse(spec, "has no columns", "columns, a tuple of dubins_traffic.Column")
     found = tuple(cast("Sequence[Column]", columns))
-    for own in found:
-        if not _NAME.fullmatch(own.name) or own.kind not in get_args(Kind) or own.kind not in KINDS:
+    for described in found:
+        if not _NAME.fullmatch(described.name) or described.kind not in get_args(Kind) or described.kind not in KINDS:
             raise _refuse(
-                spec, f"has a column that is none: {own.name} of kind {own.kind}", "a name and a kind"
+                spec, f"has a column that is none: {described.name} of kind {described.kind}", "a name and a kind"
             )
     return found
 
@@ -124,8 +121,8 @@ def _maker(spec: MetricSpec) -> Maker:
     if outside.is_place(spec):
         return outside.find(spec, _SEAM)
     if spec not in _registered():
-        own = ", ".join(_registered())
-        raise _SEAM.refuse("unknown metric", spec, f"one of {own}, module:Class or path/to/file.py:Class")
+        known = ", ".join(_registered())
+        raise _SEAM.refuse("unknown metric", spec, f"one of {known}, module:Class or path/to/file.py:Class")
     return _registered()[spec]
 
 

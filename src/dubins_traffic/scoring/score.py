@@ -134,13 +134,13 @@ class Score(Tabulated):
         for name in self.__slots__:
             value = getattr(self, name)
             if name in ("collisions", "formulas"):
-                document[name] = [own.to_json() for own in value]
+                document[name] = [part.to_json() for part in value]
             elif name == "controller":
                 document |= {name: value, "ran": ran(value)}
             elif name == "goals":
                 document[name] = [{**asdict(goal), "goal": list(goal.goal)} for goal in self.goals]
             elif name == "metrics":
-                document |= {name: {own.column.name: own.value for own in value}} if value else {}
+                document |= {name: {part.column.name: part.value for part in value}} if value else {}
             elif name == "driven":
                 document |= asdict(self.driven)
             elif name == "verdict":
@@ -150,34 +150,34 @@ class Score(Tabulated):
         return document
 
 
-def score_of(found: Findings, controller: str | None, time_to_begin: float | None) -> Score:
+def score_of(findings: Findings, controller: str | None, time_to_begin: float | None) -> Score:
     """Return the score of a trial, whose ego `controller` drove, as far as its counts and its judge tell it."""
-    instance, counts, ending, rate = found.instance, found.counts, found.ending, found.instance.problem.rate
-    visits, driven = found.visits, driven_of(counts, rate, found.last)
-    collisions, among_others = collisions_of(instance.names, found.contacts)
-    verdict = found.verdict(visits, collisions)
-    early, samples = found.tally.early[found.row], found.tally.samples[found.row]
+    instance, counts, ending, rate = findings.instance, findings.counts, findings.ending, findings.instance.problem.rate
+    visits, driven = findings.visits, driven_of(counts, rate, findings.last)
+    collisions, among_others = collisions_of(instance.names, findings.contacts)
+    verdict = findings.verdict(visits, collisions)
+    early, samples = findings.tally.early[findings.row], findings.tally.samples[findings.row]
     return Score(
         trial=instance.trial,
         seed=instance.seed,
         end=None if ending is None else ending.end.value,
         controller=None if controller is None else bare_name(controller),
         record=None,
-        duration_s=max(0, found.last) / rate,
+        duration_s=max(0, findings.last) / rate,
         rounds=visits.rounds,
-        counted_rounds=visits.rounds if is_clean(verdict, collisions, whole=found.whole) else 0,
+        counted_rounds=visits.rounds if is_clean(verdict, collisions, whole=findings.whole) else 0,
         rounds_before_breach=early_rounds(early, len(visits.goals), ending),
         goals_visited=visits.visited,
         goals=visits.goals,
         collisions=collisions,
         collisions_among_others=among_others,
         driven=driven,
-        min_clearance_m=found.gap,
+        min_clearance_m=findings.gap,
         time_to_begin_s=time_to_begin,
         verdict=verdict,
         formulas=(),
         paper_score=paper_score(instance, collisions, visits.rounds, driven.off_road_s),
-        icra2016=icra2016_of(instance, counts, samples.rounds, found.last + 1),
+        icra2016=icra2016_of(instance, counts, samples.rounds, findings.last + 1),
     )
 
 
@@ -200,8 +200,8 @@ class Scorer:
         self._judging, self._tracked = Judging(), Tracked()
         self._formulas = FormulaVerdicts()
         self._interventions = Interventions()
-        own = [] if self._own is None else [self._own]
-        self._metrics = (self._judging, self._tracked, self._formulas, self._interventions, *own)
+        further = [] if self._own is None else [self._own]
+        self._metrics = (self._judging, self._tracked, self._formulas, self._interventions, *further)
 
     def begin(self, instance: Instance) -> None:
         """Start all metrics."""
@@ -275,10 +275,8 @@ class ScoreSheet(Pictured, Tabulated):
     @property
     def summary(self) -> str:
         """The scores in a few words: their number, and the number of each verdict, or, unjudged, of each end."""
-        found = Counter(own.outcome for own in self.trials)
-        return ", ".join(
-            [count(len(self.trials), "trial"), *(f"{n} {name}" for name, n in sorted(found.items()))]
-        )
+        outcomes = Counter(trial.outcome for trial in self.trials)
+        return ", ".join([count(len(self.trials), "trial"), *(f"{n} {name}" for name, n in sorted(outcomes.items()))])
 
     def asdict(self) -> dict[str, Any]:
         """Return the scores as `to_json` does."""

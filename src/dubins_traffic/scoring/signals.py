@@ -69,8 +69,8 @@ class Signals:
         if not self._blocks:
             return {name: np.zeros(0) for name in self._wanted}
         blocks = self._blocks
-        self._x, self._y = (np.concatenate([getattr(own, name) for own in blocks]) for name in "xy")
-        self._lane: Ints = np.concatenate([own.lane for own in blocks])
+        self._x, self._y = (np.concatenate([getattr(block, name) for block in blocks]) for name in "xy")
+        self._lane: Ints = np.concatenate([block.lane for block in blocks])
         held = np.concatenate(self._held)
         found: dict[str, Floats] = {}
         for column, (name, wanted) in enumerate(self._wanted.items()):
@@ -133,9 +133,9 @@ class Signals:
         points = np.stack([self._x[:, wanted.car], self._y[:, wanted.car]], axis=-1)
         found = np.full(len(points), -np.inf)
         for lane in np.unique(lanes[lanes >= 0]).tolist():
-            own = lanes == lane
-            _, across = self._problem.network.lane_coordinates(lane, points[own])
-            found[own] = across + self._half - self._rules.left_set
+            is_there = lanes == lane
+            _, across = self._problem.network.lane_coordinates(lane, points[is_there])
+            found[is_there] = across + self._half - self._rules.left_set
         return found
 
     def _on_road(self, wanted: Proposition) -> Floats:

@@ -87,9 +87,7 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
     counts = np.zeros((trials, cars), dtype=np.int64)
     kinds, index = distinct_problems([instance.problem for instance in instances])
     rules = [RuleParameters.from_mapping(kind.rules) for kind in kinds]
-    trial["still"] = np.array([own.still_speed / kind.rate for own, kind in zip(rules, kinds, strict=True)])[
-        index
-    ]
+    trial["still"] = np.array([rule.still_speed / kind.rate for rule, kind in zip(rules, kinds, strict=True)])[index]
     trial["radius"] = np.array([kind.intersection_radius for kind in kinds])[index]
     trial["sight2"] = np.array([kind.sensing_radius * kind.sensing_radius for kind in kinds])[index]
     fleets, whose = distinct([id(instance.e_agents) for instance in instances])
@@ -97,7 +95,7 @@ def new_tally(instances: Sequence[Instance], nets: Ints, cars: int) -> Tally:
         count: list[bool] = [counts_in_2016(agent.name) for agent in instances[b].e_agents]
         counts[whose == number, 1 : 1 + len(count)] = count
     goals = [tuple(dict.fromkeys(instance.problem.goal_vertices)) for instance in instances]
-    last = np.array([len(own) for own in goals]).cumsum()
+    last = np.array([len(goal) for goal in goals]).cumsum()
     trial["first_goal"][1:] = last[:-1]
     trial["last_goal"] = last
     goal = table(GoalCounts, int(last[-1]))
@@ -135,7 +133,7 @@ def count_frame(b: int, tick: int, counted: Counted) -> None:
     """Count frame `tick` of trial b."""
     state, labels, roads, cars = counted.state, counted.labels, counted.roads, counted.cars
     obstacles, spacing, tally = counted.obstacles, counted.spacing, counted.tally
-    own = tally.trial[b]
+    trial = tally.trial[b]
     x, y = state.x[b, EGO], state.y[b, EGO]
     bits = np.int64(labels.bits[b, EGO])
     left = 1 if bits & FLAG.LEFT != 0 else 0
@@ -144,33 +142,33 @@ def count_frame(b: int, tick: int, counted: Counted) -> None:
     ego.bits, ego.lane = int(bits), labels.lane[b, EGO]
     if tick > 0:
         moved = _moved(b, EGO, state, tally)
-        own.distance += moved
-        own.standing += 0 if moved >= own.still else 1
-        own.off_road += 1 if bits & FLAG.ON_ROAD == 0 else 0
-        if left > own.left and _others_move(b, state, tally):
-            own.departures += 1
-    own.left = left
+        trial.distance += moved
+        trial.standing += 0 if moved >= trial.still else 1
+        trial.off_road += 1 if bits & FLAG.ON_ROAD == 0 else 0
+        if left > trial.left and _others_move(b, state, tally):
+            trial.departures += 1
+    trial.left = left
     _look_at_cars(b, tick, state, cars, tally)
     if obstacles.off[b] != obstacles.off[b + 1]:
-        _look_at_obstacles(b, state, cars, obstacles, own)
+        _look_at_obstacles(b, state, cars, obstacles, trial)
     at = labels.at[b, EGO]
-    if at >= 0 and at != own.last_at:
-        own.last_at = at
-        for g in range(own.first_goal, own.last_goal):
+    if at >= 0 and at != trial.last_at:
+        trial.last_at = at
+        for g in range(trial.first_goal, trial.last_goal):
             come_by(at, tally.goal[g])
-    if not _is_far(tick, own):
+    if not _is_far(tick, trial):
         spare = _count_goals(b, tick, x, y, roads, tally)
         spare = min(spare, _count_off_road(b, tick, x, y, labels.segment[b, EGO], roads, tally))
-        own.again = tick + ticks_within(spare - ROUNDING, spacing, b)
+        trial.again = tick + ticks_within(spare - ROUNDING, spacing, b)
     for n in range(state.count[b]):
         tally.before_x[b, n] = state.x[b, n]
         tally.before_y[b, n] = state.y[b, n]
 
 
 @jit_look
-def _is_far(tick: int, own: TrialCounts) -> bool:
+def _is_far(tick: int, counts: TrialCounts) -> bool:
     """Tell whether the ego is certain not to have reached a goal's disc, or the edge of the road of 2016."""
-    return tick < own.again
+    return tick < counts.again
 
 
 @jit_inline
@@ -191,9 +189,9 @@ def _others_move(b: int, state: State, tally: Tally) -> bool:
 @jit_inline
 def _look_at_cars(b: int, tick: int, state: State, cars: CarTable, tally: Tally) -> None:
     """Update the smallest gap to the cars, when each was sensed, and whether one came too near by the rules of 2016."""
-    own = tally.trial[b]
+    trial = tally.trial[b]
     x, y = state.x[b, EGO], state.y[b, EGO]
-    reach = own.clearance + 2.0 * cars.reach[b] + 1e-9
+    reach = trial.clearance + 2.0 * cars.reach[b] + 1e-9
     near2 = max(reach * reach, 2.0 * COLLISION_DISTANCE * COLLISION_DISTANCE)
     sensed = tally.sensed[b]
     near = 0
@@ -201,7 +199,7 @@ def _look_at_cars(b: int, tick: int, state: State, cars: CarTable, tally: Tally)
         dx = state.x[b, n] - x
         dy = state.y[b, n] - y
         d2 = dx * dx + dy * dy
-        if own.sealed == 0 and within_sight(dx, dy, own.sight2):
+        if trial.sealed == 0 and within_sight(dx, dy, trial.sight2):
             sensed[n] = tick
         if d2 <= near2:
             near = 1
@@ -212,17 +210,17 @@ def _look_at_cars(b: int, tick: int, state: State, cars: CarTable, tally: Tally)
 @jit
 def _look_closer(b: int, near2: float, state: State, cars: CarTable, tally: Tally) -> None:
     """Do so for the cars whose squared distance from the ego is up to `near2` (m2)."""
-    own = tally.trial[b]
+    trial = tally.trial[b]
     for n in range(1, state.count[b]):
         dx = state.x[b, n] - state.x[b, EGO]
         dy = state.y[b, n] - state.y[b, EGO]
         d2 = dx * dx + dy * dy
         if d2 <= near2:
             if tally.counts[b, n] != 0 and sqrt(d2) < COLLISION_DISTANCE:
-                own.collided = 1
-            if own.clearance > 0.0:
+                trial.collided = 1
+            if trial.clearance > 0.0:
                 gap = _car_gap(b, n, state, cars)
-                own.clearance = min(own.clearance, gap)
+                trial.clearance = min(trial.clearance, gap)
 
 
 @jit
@@ -232,19 +230,17 @@ def _car_gap(b: int, n: int, state: State, cars: CarTable) -> float:
 
 
 @jit_rare
-def _look_at_obstacles(
-    b: int, state: State, cars: CarTable, obstacles: ObstacleTable, own: TrialCounts
-) -> None:
+def _look_at_obstacles(b: int, state: State, cars: CarTable, obstacles: ObstacleTable, counts: TrialCounts) -> None:
     """Update the smallest gap to the obstacles."""
     x, y = state.x[b, EGO], state.y[b, EGO]
     for k in range(obstacles.off[b], obstacles.off[b + 1]):
         part = obstacles.parts[k]
         dx = part.x - x
         dy = part.y - y
-        far = own.clearance + cars.reach[b] + part.reach + 1e-9
-        if own.clearance > 0.0 and dx * dx + dy * dy <= far * far:
+        far = counts.clearance + cars.reach[b] + part.reach + 1e-9
+        if counts.clearance > 0.0 and dx * dx + dy * dy <= far * far:
             apart = box_gap(box_at(b, EGO, state, cars), box_of(part))
-            own.clearance = min(own.clearance, apart - cars.rounding[b] - part.rounding)
+            counts.clearance = min(counts.clearance, apart - cars.rounding[b] - part.rounding)
 
 
 @jit_inline
@@ -253,12 +249,12 @@ def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally:
 
     Returns how far the ego is from all these discs, metres; 0 where it is in one.
     """
-    own = tally.trial[b]
-    offset: int = roads.vert_off[own.net]
-    radius = own.radius
+    trial = tally.trial[b]
+    offset: int = roads.vert_off[trial.net]
+    radius = trial.radius
     some = False
     spare = FARTHEST
-    for g in range(own.first_goal, own.last_goal):
+    for g in range(trial.first_goal, trial.last_goal):
         goal = tally.goal[g]
         dx = x - roads.vertex[offset + goal.vertex].x
         dy = y - roads.vertex[offset + goal.vertex].y
@@ -270,9 +266,9 @@ def _count_goals(b: int, tick: int, x: float, y: float, roads: RoadTable, tally:
         if begins_visit(away < radius, goal):
             _count_visit(b, g, tick, tally)
     if some:
-        finish_round(own.first_goal, own.last_goal, tally.sample_done, tally.samples[b])
-        finish_round(own.first_goal, own.last_goal, tally.round_done, tally.rounds[b])
-        finish_round(own.first_goal, own.last_goal, tally.early_done, tally.early[b])
+        finish_round(trial.first_goal, trial.last_goal, tally.sample_done, tally.samples[b])
+        finish_round(trial.first_goal, trial.last_goal, tally.round_done, tally.rounds[b])
+        finish_round(trial.first_goal, trial.last_goal, tally.early_done, tally.early[b])
     return spare
 
 
@@ -291,24 +287,22 @@ def _count_visit(b: int, g: int, tick: int, tally: Tally) -> None:
 
 
 @jit_inline
-def _count_off_road(
-    b: int, tick: int, x: float, y: float, segment: int, roads: RoadTable, tally: Tally
-) -> float:
+def _count_off_road(b: int, tick: int, x: float, y: float, segment: int, roads: RoadTable, tally: Tally) -> float:
     """Count ticks off the road of 2016; return how far the ego is from the edge of its nearest segment, metres.
 
     0 where it is not on that one.
     """
-    own = tally.trial[b]
-    first = roads.seg_off[own.net]
+    trial = tally.trial[b]
+    first = roads.seg_off[trial.net]
     spare = _inside(first + segment, x, y, roads)
     on = spare >= 0.0
     if not on:
-        for k in range(first, roads.seg_off[own.net + 1]):
+        for k in range(first, roads.seg_off[trial.net + 1]):
             on = on or _inside(k, x, y, roads) >= 0.0
-    if on == (own.off_since >= 0):
+    if on == (trial.off_since >= 0):
         if on:
-            own.off_ticks += tick - own.off_since
-        own.off_since = -1 if on else tick
+            trial.off_ticks += tick - trial.off_since
+        trial.off_since = -1 if on else tick
     return max(spare, 0.0)
 
 
@@ -332,7 +326,7 @@ def count_frames(
     The trial is sealed after frame `seal` (tick). `begun` (F, G) gets 1 for each goal of which a visit begins,
     `seen` (F, N) for each car that the ego senses.
     """
-    state, ego, own = counted.state, counted.labels, counted.tally.trial[0]
+    state, ego, trial = counted.state, counted.labels, counted.tally.trial[0]
     segments = counted.roads.seg_off[1]
     for f in range(poses.x.shape[0]):
         for n in range(poses.x.shape[1]):
@@ -341,14 +335,14 @@ def count_frames(
             state.c[0, n] = poses.c[f, n]
             state.s[0, n] = poses.s[f, n]
             dx, dy = poses.x[f, n] - poses.x[f, EGO], poses.y[f, n] - poses.y[f, EGO]
-            seen[f, n] = 1 if within_sight(dx, dy, own.sight2) else 0
+            seen[f, n] = 1 if within_sight(dx, dy, trial.sight2) else 0
         ego.segment[0, EGO] = min(max(labels.segment[f, EGO], 0), segments - 1)  # a record may name others
         v, away2 = nearest_vertex(counted.roads, 0, poses.x[f, EGO], poses.y[f, EGO])
-        ego.at[0, EGO] = v if away2 < own.radius * own.radius else -1
+        ego.at[0, EGO] = v if away2 < trial.radius * trial.radius else -1
         ego.lane[0, EGO] = labels.lane[f, EGO]
         ego.bits[0, EGO] = labels.bits[f, EGO]
         if first + f > seal:
-            own.sealed = 1
+            trial.sealed = 1
         count_frame(0, first + f, counted)
         for g in range(begun.shape[1]):
             goal = counted.tally.goal[g]

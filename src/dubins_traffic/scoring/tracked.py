@@ -43,13 +43,13 @@ class Tracked:
 
     def frames(self, frames: Frames) -> None:
         """Take a block of frames."""
-        for own in self._three:
-            own.frames(frames)
+        for tracked in self._three:
+            tracked.frames(frames)
 
     def end(self, ending: Ending) -> None:
         """Keep the ending."""
-        for own in self._three:
-            own.end(ending)
+        for tracked in self._three:
+            tracked.end(ending)
 
     def findings(self) -> Findings | None:
         """Return what has been found up to the last frame as measured, None if poses are exact."""
@@ -63,8 +63,8 @@ class Tracked:
         if exact is None or not self._three:
             return exact
         verdict = replace(exact, tolerance=self._tolerance)
-        found = [own.result() for own in self._three[1:]]
-        if all(own is not None and own.verdict is verdict.verdict for own in found):
+        found = [tracked.result() for tracked in self._three[1:]]
+        if all(verdict_there is not None and verdict_there.verdict is verdict.verdict for verdict_there in found):
             return verdict
         return replace(verdict, verdict=Ruling.UNTOLD, clean=False, cut=True, excuse=None)
 
@@ -108,7 +108,7 @@ class _Judged(Judging):
                         entered.add((car, vertex, tick))
                     self._met[car, vertex] = tick
         breaches, judged = super()._judged(replace(frames, **columns, contacts=tuple(contacts)))
-        return [own for own in breaches if not _is_again(own, entered)], judged
+        return [breach for breach in breaches if not _is_again(breach, entered)], judged
 
 
 def _is_again(breach: Breach, entered: set[tuple[int, int, int]]) -> bool:

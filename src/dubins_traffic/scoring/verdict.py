@@ -178,9 +178,9 @@ class Verdict:
         return tuple(violation for violation in self.violations if violation.car == EGO_NAME)
 
     def __repr__(self) -> str:
-        own = len(self.own_violations)
-        others = len(self.violations) - own
-        return f"<Verdict: {self.verdict.value}, breaches: {own} by the ego, {others} by others>"
+        violations = len(self.own_violations)
+        others = len(self.violations) - violations
+        return f"<Verdict: {self.verdict.value}, breaches: {violations} by the ego, {others} by others>"
 
     def asdict(self) -> dict[str, Any]:
         """Return the verdict as `to_json` does."""
@@ -244,25 +244,25 @@ def reach_verdict(
     """
     rate = instance.problem.rate
     violations = tuple([violation_of(instance, breach) for breach in breaches])
-    own = [breach for breach in breaches if breach.car == EGO]
+    of_ego = [breach for breach in breaches if breach.car == EGO]
     fall = first_fall(breaches, rules, rate) if breaches else None
     gap = max([goal.longest_gap_s for goal in visits.goals], default=None)
     limit = gap_limit(instance, rules) if visits.goals else None
     excuse, near = None, None
-    if not own:
+    if not of_ego:
         done = whole and visits.recurrent and (gap is None or limit is None or gap <= limit)
         ruling = Ruling.SATISFIED if done else Ruling.UNFINISHED
-    elif fall is None or fall[1].tick > own[0].tick:
+    elif fall is None or fall[1].tick > of_ego[0].tick:
         ruling = Ruling.VIOLATED
     else:
         ruling = Ruling.EXCUSED
         back = ticks(rules.witness_time, rate)
-        sensed = was_sensed(fall[1].car, max(0, own[0].tick - back), own[0].tick)
+        sensed = was_sensed(fall[1].car, max(0, of_ego[0].tick - back), of_ego[0].tick)
         excuse = Excuse(fall[0], violations[breaches.index(fall[1])], sensed)
         near = is_near(breaches, back, seen)
     return Verdict(
         ruling,
-        clean := not own and whole,
+        clean := not of_ego and whole,
         was_cut(ruling, clean, end),
         excuse,
         near,

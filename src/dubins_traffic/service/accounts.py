@@ -158,9 +158,7 @@ def _register(session: Session, code: str, name: str, password: str, team: str, 
     invitation = _good(session, code, "invitation", at)
     invitation.used = at
     name = clean_name(name, "name")
-    if RESERVED.fullmatch(name) or name.casefold() in map(
-        str.casefold, session.scalars(select(Account.name))
-    ):
+    if RESERVED.fullmatch(name) or name.casefold() in map(str.casefold, session.scalars(select(Account.name))):
         raise WrongEntryError("name: taken")
     account = Account(
         name=name,

@@ -75,8 +75,8 @@ def _replays(service: Service, session: Session, submission: Submission) -> Iter
 
 
 def _published(service: Service, phase: Phase) -> Iterator[tuple[str, bytes]]:
-    own = service.phase(phase)
+    phase_here = service.phase(phase)
     if phase.commitment is not None:
-        yield f"{phase.name}.commitment.json", sealing.commitment_path(own).read_bytes()
+        yield f"{phase.name}.commitment.json", sealing.commitment_path(phase_here).read_bytes()
     if phase.revealed is not None:
-        yield f"{phase.name}.seeds.txt", sealing.revealed_path(own).read_bytes()
+        yield f"{phase.name}.seeds.txt", sealing.revealed_path(phase_here).read_bytes()

@@ -64,13 +64,9 @@ class Connection:
         with needs("asking a service", "client"):
             import httpx
         if not url.startswith(("http://", "https://")):
-            raise InputError(
-                "no address of a service", field="URL", value=url, expected="https://... or http://..."
-            )
+            raise InputError("no address of a service", field="URL", value=url, expected="https://... or http://...")
         headers = {"authorization": f"Bearer {token.strip()}"} if token else {}
-        self._client: httpx.Client = httpx.Client(
-            base_url=url.rstrip("/"), headers=headers, timeout=TIMEOUT_S
-        )
+        self._client: httpx.Client = httpx.Client(base_url=url.rstrip("/"), headers=headers, timeout=TIMEOUT_S)
 
     def close(self) -> None:
         """Hang up."""
@@ -184,9 +180,7 @@ def competition_at(url: str) -> tuple[Address, str | None]:
     """
     parts = _COMPETITION.fullmatch(url)
     if parts is None:
-        raise InputError(
-            "no address of a competition", value=url, expected="https://host/c/COMPETITION/PHASE"
-        )
+        raise InputError("no address of a competition", value=url, expected="https://host/c/COMPETITION/PHASE")
     return Address(parts[1], f"/api/competitions/{parts[2]}"), parts[3]
 
 

@@ -44,8 +44,8 @@ def rivals(
 ) -> list[tuple[int, str]]:
     """Return what somebody may compare a submission with: numbers and names of others whose trials they may see."""
     row, at = submission.phase, service.clock()
-    own = receiving.submissions_of(session, row, submission.team_id)
-    found = {one.id: f"{one.id}, {one.filename}" for one in own if one.state not in ("rejected", "cancelled")}
+    submissions = receiving.submissions_of(session, row, submission.team_id)
+    found = {one.id: f"{one.id}, {one.filename}" for one in submissions if one.state not in ("rejected", "cancelled")}
     _, places = viewing.latest_places(service, session, row, account)
     for place in places:
         other = session.get_one(Submission, place["submission"])
@@ -55,9 +55,7 @@ def rivals(
     return list(found.items())
 
 
-def beside(
-    service: Service, session: Session, number: int, other: int, account: Account | None
-) -> dict[str, Any]:
+def beside(service: Service, session: Session, number: int, other: int, account: Account | None) -> dict[str, Any]:
     """Return a submission of somebody's team and another to the same phase, trial by trial.
 
     The trials in which the other counted the most more come first.
@@ -89,9 +87,7 @@ def beside(
 def progress(service: Service, session: Session, row: Phase, team_id: int) -> list[dict[str, Any]]:
     """Return the latest submissions of a team to a phase that have a mean it may see, oldest first."""
     latest = receiving.submissions_of(session, row, team_id)[:SHOWN]
-    documents = [
-        viewing.submission_document(service, session, one, None, {}, logs=False) for one in reversed(latest)
-    ]
+    documents = [viewing.submission_document(service, session, one, None, {}, logs=False) for one in reversed(latest)]
     return steps(service, row, documents)
 
 

@@ -50,9 +50,7 @@ class Database:
         sqlite = url.startswith("sqlite")
         options: dict[str, Any] = {"connect_args": {"timeout": 30}} if sqlite else {"pool_pre_ping": True}
         # What a statement was given may be secret, and its error goes to the log: `hide_parameters`.
-        self.engine: Engine = create_engine(
-            url, pool_size=16, max_overflow=32, hide_parameters=True, **options
-        )
+        self.engine: Engine = create_engine(url, pool_size=16, max_overflow=32, hide_parameters=True, **options)
         self._writes = self.engine.execution_options(writes=True)
         self._failed = threading.Event()
         if sqlite:

@@ -109,9 +109,7 @@ def edit(
     return found
 
 
-def edit_by_files(
-    service: Service, slug: str, given: Mapping[str, bytes], by: Account | None
-) -> list[Change]:
+def edit_by_files(service: Service, slug: str, given: Mapping[str, bytes], by: Account | None) -> list[Change]:
     """Change a competition into what its file says, as `edit` does; the file is kept in place of the one before."""
     given = {FILE: next(iter(given.values()))} if len(given) == 1 else given
     with tempfile.TemporaryDirectory(dir=service.place(slug).parent) as draft:

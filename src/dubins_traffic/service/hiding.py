@@ -78,9 +78,7 @@ class Hiding:
         if isinstance(row, Standing):
             twin = Standing(phase_id=row.phase_id, at=row.at, version=row.version, **self._known(row))
             return cast("Row", twin)
-        same = {
-            name: getattr(row, name) for name in ("submission_id", "run", "number", "replay", "own_replay")
-        }
+        same = {name: getattr(row, name) for name in ("submission_id", "run", "number", "replay", "own_replay")}
         twin_trial = Trial(**same, **self._known(row))
         if logs:
             packed = base64.b64decode(row.log)

@@ -73,9 +73,7 @@ def check_podiums(service: Service) -> None:
             if service.waits_for_key(phase):
                 continue
             active = Submission.state.in_(submissions.ACTIVE)
-            busy = session.scalars(
-                select(Submission.id).where(Submission.phase_id == phase.id, active).limit(1)
-            )
+            busy = session.scalars(select(Submission.id).where(Submission.phase_id == phase.id, active).limit(1))
             if busy.first() is None and phase.ranked >= phase.version:
                 _run_podium_again(session, phase, service.hiding(phase), service.clock())
 

@@ -65,9 +65,7 @@ def create(service: Service, slug: str, given: Mapping[str, bytes], by: Account 
                 raise WrongEntryError("address: taken")
             made = _rows(session, slug, loaded, service.clock())
             note(session, by, "create", slug, loaded.title, service.clock())
-            shutil.rmtree(
-                place, ignore_errors=True
-            )  # of a creation that was killed before its rows were kept
+            shutil.rmtree(place, ignore_errors=True)  # of a creation that was killed before its rows were kept
             shutil.copytree(draft, place)
     publish_opened(service)
     return made
@@ -114,9 +112,7 @@ def _named_files(draft: Path) -> list[str]:
         entries: list[Any] = list(document.get("configurations", []))
     except (OSError, ValueError, TypeError):
         return []  # load_competition says what is wrong
-    named: list[Any] = [
-        cast("Any", entry).get("file", "") if isinstance(entry, dict) else entry for entry in entries
-    ]
+    named: list[Any] = [cast("Any", entry).get("file", "") if isinstance(entry, dict) else entry for entry in entries]
     return [name for name in named if isinstance(name, str) and ("/" in name or "\\" in name)]
 
 
@@ -199,9 +195,7 @@ def _later(text: str) -> float:
         raise WrongEntryError(f"until: {shown(text, 40)}: a time in UTC, as 2027-03-01T12:00:00Z") from None
 
 
-def announce(
-    service: Service, session: Session, row: Competition, by: Account, title: str, text: str
-) -> None:
+def announce(service: Service, session: Session, row: Competition, by: Account, title: str, text: str) -> None:
     """Tell everybody something, in Markdown, on the page of a competition and in its feed."""
     if not 1 <= len(title.strip()) <= 200 or not text.strip():
         raise WrongEntryError("announcement: a title of 1 to 200 letters, and a text")

@@ -57,9 +57,7 @@ def map_of(page: bytes, *, moves: bool = False) -> str:
             {"path": _path(way), "last": _at(way[-1]), "colour": car["colour"], "moves": _moves(way)}
             for way, car in reversed(list(zip(ways, document["cars"], strict=True)))
         ],
-        "contacts": [
-            _at(mark["point"]) for mark in document["marks"] if mark["kind"] == "contact" and mark["point"]
-        ],
+        "contacts": [_at(mark["point"]) for mark in document["marks"] if mark["kind"] == "contact" and mark["point"]],
         "looks": palette.MAP,
         "moving": moves,
         "seconds": MOVES_S,

@@ -45,9 +45,7 @@ def add(session: Session, submission: Submission, kind: str, chunks: Sequence[Se
     session.flush()
 
 
-def take(
-    session: Session, worker: str, at: float, seconds: float, unjudged: Sequence[int] = ()
-) -> Chunk | None:
+def take(session: Session, worker: str, at: float, seconds: float, unjudged: Sequence[int] = ()) -> Chunk | None:
     """Lease the chunk that is next to a worker, for so many seconds; None if nothing waits.
 
     Of the phases `unjudged` submissions are checked alone.
@@ -95,10 +93,7 @@ def _charged(session: Session, at: float) -> Mapping[int, tuple[float, int, int]
     leased = select(Chunk.team_id, Chunk.leased_at).where(Chunk.state == "leased")
     for team_id, since in session.execute(leased).all():
         leases.setdefault(team_id, []).append(max(0.0, at - (at if since is None else since)))
-    return {
-        number: (turn + sum(leases.get(number, ())), len(leases.get(number, ())), number)
-        for number, turn in teams
-    }
+    return {number: (turn + sum(leases.get(number, ())), len(leases.get(number, ())), number) for number, turn in teams}
 
 
 def _charge(session: Session, chunk: Chunk, at: float) -> None:
@@ -165,9 +160,7 @@ def drop(session: Session, submission: Submission, at: float) -> None:
     for chunk in session.scalars(select(Chunk).where(of_it, Chunk.state == "leased")):
         _charge(session, chunk, at)
     session.flush()
-    session.execute(
-        update(Chunk).where(of_it, Chunk.state.in_(["waiting", "leased"])).values(state="dropped")
-    )
+    session.execute(update(Chunk).where(of_it, Chunk.state.in_(["waiting", "leased"])).values(state="dropped"))
 
 
 def unfinished(session: Session, submission: Submission) -> int:
@@ -199,9 +192,7 @@ def places(session: Session, at: float) -> Mapping[int, int]:
         before[team_id] += 1
         if submission_id not in places_ahead:
             others = sum(
-                min(many[other], ahead + (turns[other] < turns[team_id]))
-                for other in many
-                if other != team_id
+                min(many[other], ahead + (turns[other] < turns[team_id])) for other in many if other != team_id
             )
             places_ahead[submission_id] = ahead + others + 1
     return places_ahead

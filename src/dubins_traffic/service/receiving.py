@@ -44,9 +44,7 @@ def submission_numbered(session: Session, number: int, account: Account | None) 
     return submission
 
 
-def take_in(
-    service: Service, account: Account, slug: str, name: str, filename: str, data: bytes
-) -> tuple[int, bool]:
+def take_in(service: Service, account: Account, slug: str, name: str, filename: str, data: bytes) -> tuple[int, bool]:
     """Keep what somebody has sent and queue it; the same again is the same submission.
 
     The bytes are in the store before a row names them, so a server that is killed in between loses nothing that it

@@ -37,9 +37,7 @@ Positive = Annotated[float, Field(gt=0)]
 class ServiceSettings(Strict):
     """What may be set, and what it is unless set."""
 
-    name: str = Field(
-        default="dubins-traffic", min_length=1, max_length=100, description="title of the pages"
-    )
+    name: str = Field(default="dubins-traffic", min_length=1, max_length=100, description="title of the pages")
     url: str = Field(
         default="",
         description="address that people type, with https behind a TLS proxy; left out: where it listens",
@@ -47,18 +45,14 @@ class ServiceSettings(Strict):
     database: str = Field(
         default="", description="address of a PostgreSQL, as postgresql+psycopg://...; left out: SQLite here"
     )
-    storage: str = Field(
-        default="", description="folder or s3://... for submissions and replays; left out: here"
-    )
+    storage: str = Field(default="", description="folder or s3://... for submissions and replays; left out: here")
     proxies: list[str] = Field(
         default=["127.0.0.1"], description="addresses of proxies whose X-Forwarded-* are believed"
     )
     lease: Positive = Field(default=60.0, description="how long a worker may be silent, s")
     largest_upload: Annotated[int, Field(ge=1)] = Field(default=16, description="MiB of a submission")
     largest_replay: Annotated[int, Field(ge=1)] = Field(default=32, description="MiB of a replay, packed")
-    logins: Annotated[int, Field(ge=1)] = Field(
-        default=20, description="attempts to log in, a minute and address"
-    )
+    logins: Annotated[int, Field(ge=1)] = Field(default=20, description="attempts to log in, a minute and address")
 
     @property
     def secure(self) -> bool:
@@ -177,9 +171,7 @@ class Service:
         if self._read_key is None and self.key_file is not None and exists(self.key_file):
             self._read_key = _read(self.key_file, self.folder)
         if self._read_key is None:
-            raise NoKeyError(
-                "no key for what is secret", file="--key-file", expected="a key file outside the folder"
-            )
+            raise NoKeyError("no key for what is secret", file="--key-file", expected="a key file outside the folder")
         return self._read_key
 
     def has_key(self) -> bool:
@@ -224,9 +216,7 @@ def default_key(folder: Path) -> Path:
     import platformdirs
 
     name = hashlib.sha256(str(folder.resolve()).encode()).hexdigest()[:16]
-    return (
-        Path(platformdirs.user_config_dir("dubins-traffic")) / "keys" / f"{folder.resolve().name}-{name}.key"
-    )
+    return Path(platformdirs.user_config_dir("dubins-traffic")) / "keys" / f"{folder.resolve().name}-{name}.key"
 
 
 def _moment(at: float | None) -> datetime | None:
@@ -255,9 +245,7 @@ def _read(path: Path, folder: Path) -> bytes:
     key, check = sealing.read_key(path, folder), folder / CHECK
     if check.exists():
         if not _fits(key, check.read_bytes()):
-            raise NoKeyError(
-                "not the key of this folder", file=str(path), expected=f"the key that wrote {check}"
-            )
+            raise NoKeyError("not the key of this folder", file=str(path), expected=f"the key that wrote {check}")
     elif not _has_competitions(folder):
         hidden = hiding_of(key, CHECK).hide(b"", CHECK)
         replace_file(check, lambda neighbour: neighbour.write_bytes(hidden), durable=True)

@@ -77,27 +77,21 @@ def _say_changes(service: Service, slug: str, path: Path) -> None:
     try:
         loaded = load_competition(path)
     except InputError as error:
-        log.error(
-            "the file of a competition that has begun can't be read", competition=slug, error=str(error)
-        )
+        log.error("the file of a competition that has begun can't be read", competition=slug, error=str(error))
         return
     with service.database.reading() as session:
         row = competition_of(session, slug)
         found = [] if row is None else editing.changes(service, row, loaded)
     for change in found:
         advice = "locked" if change.locked else f"to change it: /desk/edit/{slug}"
-        log.warning(
-            "the file differs from the competition", competition=slug, difference=str(change), advice=advice
-        )
+        log.warning("the file differs from the competition", competition=slug, difference=str(change), advice=advice)
 
 
 def local_token(service: Service) -> str:
     """Return a token for the workers beside this server; those of servers before it end."""
 
     def make(session: Session) -> str:
-        old = update(Token).where(
-            Token.name == accounts.LOCAL, Token.account_id.is_(None), Token.revoked.is_(None)
-        )
+        old = update(Token).where(Token.name == accounts.LOCAL, Token.account_id.is_(None), Token.revoked.is_(None))
         session.execute(old.values(revoked=service.clock()))
         return accounts.new_token(session, accounts.LOCAL, None, service.clock())
 
@@ -110,9 +104,7 @@ class Workers(threading.Thread):
     `program` is the command of a worker, without its arguments.
     """
 
-    def __init__(
-        self, count: int, program: Sequence[str], url: str, token: str, folder: Path, *, trust: bool
-    ) -> None:
+    def __init__(self, count: int, program: Sequence[str], url: str, token: str, folder: Path, *, trust: bool) -> None:
         super().__init__(name="workers", daemon=True)
         self._count, self._url, self._token, self._folder = count, url, token, folder
         self._program = program
@@ -204,9 +196,7 @@ def serve(
         log_level="warning",
         timeout_graceful_shutdown=10,
     )
-    beside = Workers(
-        workers, program, address_of(opened), local_token(service), service.folder / "work", trust=trust
-    )
+    beside = Workers(workers, program, address_of(opened), local_token(service), service.folder / "work", trust=trust)
     for number in (signal.SIGINT, signal.SIGTERM):  # the server raises them again when it has ended
         signal.signal(number, _nothing)
     keeper = Housekeeper(service)

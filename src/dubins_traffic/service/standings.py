@@ -44,9 +44,7 @@ def judged(trials: Sequence[Trial], *, logs: bool = False) -> list[Judged]:
 
 def counting(session: Session, phase: Phase) -> Mapping[int, Submission]:
     """Return the submission of each team that counts: the one it has named, else the last valid one."""
-    submissions_of_phase = select(Submission).where(
-        Submission.phase_id == phase.id, Submission.disqualified == ""
-    )
+    submissions_of_phase = select(Submission).where(Submission.phase_id == phase.id, Submission.disqualified == "")
     ended = submissions_of_phase.where(Submission.state.in_(["done", "scoring"]))
     counted: dict[int, Submission] = {}
     for submission in session.scalars(ended.order_by(Submission.named, Submission.received, Submission.id)):

@@ -140,9 +140,7 @@ def used(session: Session, phase: Phase, team_id: int, at: float) -> tuple[int, 
     of_team = select(func.count()).where(Submission.phase_id == phase.id, Submission.team_id == team_id)
     costs = of_team.where(Submission.costs)
     active = of_team.where(Submission.state.in_(ACTIVE))
-    counted = (
-        session.scalar(query) or 0 for query in (costs.where(Submission.received >= day), costs, active)
-    )
+    counted = (session.scalar(query) or 0 for query in (costs.where(Submission.received >= day), costs, active))
     today, total, queued = counted
     return today, total, queued
 
@@ -222,9 +220,7 @@ def cancel(session: Session, submission: Submission, at: float) -> None:
     enter(submission, "cancelled", at, "cancelled by the team", THEIRS)
 
 
-def record(
-    session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at: float, hiding: Hiding
-) -> None:
+def record(session: Session, chunk: Chunk, results: Sequence[dict[str, Any]], at: float, hiding: Hiding) -> None:
     """Keep the results of the first trials of a chunk, end its lease, queue the rest, and let the submission go on.
 
     Parameters
@@ -276,9 +272,7 @@ def _go_on(session: Session, submission: Submission, chunk: Chunk, at: float) ->
     submission.phase.version += 1
 
 
-def trials(
-    session: Session, submission: Submission, hiding: Hiding, *, logs: bool = False
-) -> Sequence[Trial]:
+def trials(session: Session, submission: Submission, hiding: Hiding, *, logs: bool = False) -> Sequence[Trial]:
     """Return the results of a submission's present run, in the order of their numbers; logs are read if asked for."""
     return [hiding.shown(trial, logs=logs) for trial in _kept(session, submission, logs=logs)]
 

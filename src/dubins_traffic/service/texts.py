@@ -43,11 +43,7 @@ FORMULAS: Final = ("=", "+", "-", "@", "\t", "\r")
 def _parser() -> Any:
     from markdown_it import MarkdownIt
 
-    made = (
-        MarkdownIt("commonmark", {"html": False})
-        .enable("table")
-        .disable(["image", "html_block", "html_inline"])
-    )
+    made = MarkdownIt("commonmark", {"html": False}).enable("table").disable(["image", "html_block", "html_inline"])
     made.validateLink = lambda url: url.lower().startswith(("https://", "http://"))  # pyright: ignore[reportAttributeAccessIssue]
     return made
 

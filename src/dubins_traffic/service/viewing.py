@@ -181,9 +181,7 @@ def submission_document(
         "active": submission.state in submissions.ACTIVE,
         **visible(phase, state, results, now=now),
         "shows": row.shows,
-        "deadline": iso(submission.deadline)
-        if submission.state in submissions.ACTIVE and not secret
-        else None,
+        "deadline": iso(submission.deadline) if submission.state in submissions.ACTIVE and not secret else None,
     }
 
 

@@ -36,9 +36,7 @@ UNFIT_S = 5.0
 """How long a worker that has no room leaves the work to others."""
 LONGEST_S = 1.0
 """A chunk whose trials have taken so long is reported as far as it is done: others wait for no more than this."""
-NO_ROOM = frozenset(
-    (errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM)
-)
+NO_ROOM = frozenset((errno.ENOSPC, errno.EDQUOT, errno.EROFS, errno.EIO, errno.EMFILE, errno.ENFILE, errno.ENOMEM))
 
 
 class Worker:
@@ -115,9 +113,7 @@ class Worker:
         note, unfit = f"{type(error).__name__}: {error}"[:500], lacks_room(error)
         release = {**token, "note": note, "left": unfit}
         with contextlib.suppress(RefusalError):
-            self._service.patiently(
-                lambda: self._service.post(f"{where}/release", release), self._stopping.is_set
-            )
+            self._service.patiently(lambda: self._service.post(f"{where}/release", release), self._stopping.is_set)
         if unfit:
             self._stopping.wait(UNFIT_S)
 
@@ -183,9 +179,7 @@ class Worker:
     def _seed(self, number: int, lease: dict[str, Any], lost: threading.Event) -> int:
         """Return the seed of a trial that is run next; the service gives one at a time."""
         where, token = f"/worker/chunks/{lease['chunk']}/trials/{number}/seed", {"token": lease["token"]}
-        return int(
-            self._service.patiently(lambda: self._service.post(where, token), self._over(lost))["seed"]
-        )
+        return int(self._service.patiently(lambda: self._service.post(where, token), self._over(lost))["seed"])
 
     def _over(self, lost: threading.Event) -> Callable[[], bool]:
         """Return what tells that a lease is of no use any more."""
@@ -211,9 +205,7 @@ class Worker:
         where = f"/worker/chunks/{lease['chunk']}/replays?token={lease['token']}"
         packed = gzip.compress(page.encode(), 6, mtime=0)
         try:
-            return self._service.patiently(lambda: self._service.put(where, packed), self._over(lost))[
-                "digest"
-            ]
+            return self._service.patiently(lambda: self._service.put(where, packed), self._over(lost))["digest"]
         except RefusalError as error:  # too large for the service: the result counts without it
             log.warning("a replay is refused", trial=number, error=str(error))
             return None

@@ -49,8 +49,8 @@ class Outside:
 
         clock : whether `/clock` is published. elsewhere : whether another process is the maestro.
         """
-        own = {"--poses": self.poses, "--delay": self.delay, "--noise": self.noise, "--loss": self.loss}
-        for option, value in own.items():
+        options = {"--poses": self.poses, "--delay": self.delay, "--noise": self.noise, "--loss": self.loss}
+        for option, value in options.items():
             if value is not None and not self:
                 expected = f"--simulator {self.world}"
                 raise InputError("is of another world", file=option, value=value, expected=expected)
@@ -62,9 +62,7 @@ class Outside:
             raise InputError("a world outside has its own time", file="--simulator", expected=expected)
         if elsewhere and (pace.lockstep or pace.factor != 1.0):
             expected = "neither --lockstep nor --factor"
-            raise InputError(
-                "another maestro has its own time", file="--maestro-elsewhere", expected=expected
-            )
+            raise InputError("another maestro has its own time", file="--maestro-elsewhere", expected=expected)
         if elsewhere and plan.append:
             expected = "--overwrite, or another folder: the other maestro tells other problems"
             raise InputError("both at once", file="--maestro-elsewhere, --append", expected=expected)

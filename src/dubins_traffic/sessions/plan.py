@@ -101,14 +101,10 @@ class SessionPlan:
         if self.records is None:
             return self
         driver = self.controller or (controllers.shielded(transport) if self.shield else transport)
-        kept = claim(
-            self.records, driver, self._instance, overwrite=self.overwrite, append=self.append, placed=True
-        )
+        kept = claim(self.records, driver, self._instance, overwrite=self.overwrite, append=self.append, placed=True)
         earlier = Earlier.of(self.records, kept)
         if earlier.over:
-            self.say(
-                f"{len(earlier.over)} trials have their records in {self.records}, and are not run again"
-            )
+            self.say(f"{len(earlier.over)} trials have their records in {self.records}, and are not run again")
         return replace(self, earlier=earlier)
 
     def _instance(self, number: int) -> Instance:
@@ -268,16 +264,12 @@ def session_plan(
         controller = controllers.shielded(controller) if shield else controller
         controllers.load(controller)
     if trials is not None and (trials < 1 or endless):
-        raise InputError(
-            "not a number of trials", file="--trials", value=trials, expected="at least 1, or --endless"
-        )
+        raise InputError("not a number of trials", file="--trials", value=trials, expected="at least 1, or --endless")
     supply = _supply(runnable, seed or 0)
     hand_over(supply(0), remote)
     configuration = runnable if isinstance(runnable, Configuration) else None
     if data is not None and configuration is None:
-        raise InputError(
-            "is for configurations", file="-f", value=os.fspath(data), expected="none of it here"
-        )
+        raise InputError("is for configurations", file="-f", value=os.fspath(data), expected="none of it here")
     count = trials or (1 if configuration is None else configuration.number_trials)
     return SessionPlan(
         supply,
@@ -300,9 +292,7 @@ def rehearse(instance: Instance, *, shield: bool = False) -> None:
     a world outside are not told to move yet: embedded ones move in their place.
     """
     agents = tuple(
-        replace(agent, kind="scripted", parameters={"commands": [], "repeat": False})
-        if agent.kind == REMOTE
-        else agent
+        replace(agent, kind="scripted", parameters={"commands": [], "repeat": False}) if agent.kind == REMOTE else agent
         for agent in instance.e_agents
     )
     simulator = "embedded" if instance.simulator in OUTSIDE else instance.simulator

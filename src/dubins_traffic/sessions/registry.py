@@ -203,9 +203,7 @@ TRANSPORTS: dict[str, TransportEntry] = {
             "ros2 run demo --remote agent0 --controller lanes --lockstep",
         ),
         options=(
-            Option(
-                "--domain", int, "DDS domain.", metavar="N", low=0, high=232, shown="$ROS_DOMAIN_ID, else 0"
-            ),
+            Option("--domain", int, "DDS domain.", metavar="N", low=0, high=232, shown="$ROS_DOMAIN_ID, else 0"),
             Option(
                 "--wide",
                 bool,

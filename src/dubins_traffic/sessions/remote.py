@@ -131,9 +131,7 @@ def hand_over(instance: Instance, remote: Iterable[str]) -> Instance:
     """
     wanted = set(remote)
     for name in sorted(wanted - set(instance.names[1:])):
-        expected = (
-            f"one of {', '.join(instance.names[1:21])}" if instance.e_agents else "an instance with e-agents"
-        )
+        expected = f"one of {', '.join(instance.names[1:21])}" if instance.e_agents else "an instance with e-agents"
         raise InputError("no such e-agent", file="--remote", value=name, expected=expected)
     agents = tuple(
         replace(agent, kind=REMOTE, type=REMOTE, parameters={}) if agent.name in wanted else agent
@@ -281,9 +279,7 @@ def with_problem(instance: Instance, text: str) -> Instance:
     radius = problem.intersection_radius
     return replace(
         instance,
-        problem=replace(
-            instance.problem, network=problem.network, goals=problem.goals, intersection_radius=radius
-        ),
+        problem=replace(instance.problem, network=problem.network, goals=problem.goals, intersection_radius=radius),
         duration=LONGEST,
     )
 

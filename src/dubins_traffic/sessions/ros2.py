@@ -32,9 +32,7 @@ def make_transport(
     """Return the transport; MissingExtraError if the extra `ros2` is not installed."""
     with needs("ROS 2", "ros2"):
         from dubins_traffic.transports.ros2.transport import Ros2
-    return Ros2(
-        domain, maestro=maestro, here=here, clock=clock, simulated=simulated, markers=markers, foreign=foreign
-    )
+    return Ros2(domain, maestro=maestro, here=here, clock=clock, simulated=simulated, markers=markers, foreign=foreign)
 
 
 def run_over_ros2(
@@ -95,6 +93,4 @@ def run_over_ros2(
 
         return outside.made(Ros2Wire(transport.graph, poses), session_plan)
 
-    yield from session_plan.run(
-        transport, pace, maestro, make if outside else None, at=lambda: where, foreign=foreign
-    )
+    yield from session_plan.run(transport, pace, maestro, make if outside else None, at=lambda: where, foreign=foreign)

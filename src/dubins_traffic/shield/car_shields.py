@@ -61,11 +61,11 @@ class CarShields:
         self._views = views
         self._places = cars.shape[1]
         self._rows: Ints = np.flatnonzero(cars)
-        own = [problem for problem in problems for _ in range(self._places)]
-        self._traffic = _traffic_of(own, views.state, views.labels)
-        self._shields = shield_tables(own, self._traffic, overtakes=check_overtakes(overtakes))
-        self._tick: Ints = np.full(len(own), -1)
-        self._commands = np.zeros((len(own), self._places, 2))
+        each = [problem for problem in problems for _ in range(self._places)]
+        self._traffic = _traffic_of(each, views.state, views.labels)
+        self._shields = shield_tables(each, self._traffic, overtakes=check_overtakes(overtakes))
+        self._tick: Ints = np.full(len(each), -1)
+        self._commands = np.zeros((len(each), self._places, 2))
         self._shield = bound(shield)
 
     def filter(self, ticks: Ints, commands: Floats) -> Ints:

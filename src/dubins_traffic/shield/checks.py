@@ -69,8 +69,8 @@ def may_touch(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic
     command = Command(speed, yaw_rate)
     travel = travel_of(vehicle)
     turns = abs(yaw_rate) * vehicle.reach if vehicle.half_length > 0.0 else 0.0
-    own = (abs(speed) + turns) * vehicle.period
-    between = max(own / 8.0 - GUARD, 0.0)
+    drive = (abs(speed) + turns) * vehicle.period
+    between = max(drive / 8.0 - GUARD, 0.0)
     for k in range(near):
         j = scratch.near[k]
         other = body_at(Pose(state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j]), vehicle)
@@ -174,9 +174,7 @@ def _leaves_lane(
         return REASON.RETURN if reach + vehicle.unsure >= shields.ego[b].left_release else REASON.NOTHING
     if reach <= vehicle.over - BRINK:
         return REASON.NOTHING
-    return (
-        REASON.NOTHING if reach < min(vehicle.over, _reach(b, after, traffic, net, vehicle)) else REASON.LANE
-    )
+    return REASON.NOTHING if reach < min(vehicle.over, _reach(b, after, traffic, net, vehicle)) else REASON.LANE
 
 
 @jit

@@ -60,9 +60,7 @@ def shield(tick: Any, sighted: bool, traffic: Traffic, shields: ShieldTables, co
 
 
 @jit
-def shield_trial(
-    b: int, tick: int, sight2: float, traffic: Traffic, shields: ShieldTables, commands: Floats
-) -> None:
+def shield_trial(b: int, tick: int, sight2: float, traffic: Traffic, shields: ShieldTables, commands: Floats) -> None:
     """Replace the command of the ego of trial b if it would break a rule; `sight2` (m2) as for `gather_close`."""
     state, labels, drivers, scratch = traffic.state, traffic.labels, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
@@ -184,8 +182,8 @@ def _has_way_back(b: int, sight2: float, traffic: Traffic, shields: ShieldTables
         find_way_past(b, EGO, way, -1, traffic)
         unlist_cars(b, traffic)
         car.waited = waited
-    own = along(way, state.x[b, EGO], state.y[b, EGO])
-    time = passing_time(own, car.until, traffic.scratch.tight[0], vehicle)
+    here = along(way, state.x[b, EGO], state.y[b, EGO])
+    time = passing_time(here, car.until, traffic.scratch.tight[0], vehicle)
     if unrolled:
         put_back(b, traffic)
     return car.aside != 0.0 and time <= shields.ego[b].left_time

@@ -125,14 +125,10 @@ def check_overtakes(value: object) -> Overtakes:
     for known in get_args(Overtakes):
         if value == known:
             return known
-    raise InputError(
-        "not a way to overtake", field="overtakes", value=value, expected=", ".join(get_args(Overtakes))
-    )
+    raise InputError("not a way to overtake", field="overtakes", value=value, expected=", ".join(get_args(Overtakes)))
 
 
-def shield_tables(
-    problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtakes = "sure"
-) -> ShieldTables:
+def shield_tables(problems: Sequence[Problem], traffic: Traffic, *, overtakes: Overtakes = "sure") -> ShieldTables:
     """Return the shield's tables for trials before their first frame.
 
     Parameters
@@ -147,14 +143,14 @@ def shield_tables(
     trials = len(problems)
     known = table(Ego, trials)
     for b, problem in enumerate(problems):
-        own, rules = known[b], RuleParameters.from_mapping(problem.rules)
-        own.mode = get_args(Overtakes).index(overtakes)
-        own.cars = 1 + len(problem.e_agents)
-        own.left_release = rules.left_release
-        own.turn_back = rules.turn_back
-        own.left_time = rules.left_time
-        own.sight2 = problem.sensing_radius**2
-        own.blocked_ahead = rules.blocked_ahead
+        row, rules = known[b], RuleParameters.from_mapping(problem.rules)
+        row.mode = get_args(Overtakes).index(overtakes)
+        row.cars = 1 + len(problem.e_agents)
+        row.left_release = rules.left_release
+        row.turn_back = rules.turn_back
+        row.left_time = rules.left_time
+        row.sight2 = problem.sensing_radius**2
+        row.blocked_ahead = rules.blocked_ahead
     drivers = traffic.drivers
     parts = pack_obstacles([problem.obstacles for problem in problems])
     obstacles = place_obstacles(parts, traffic.roads, drivers.net)
@@ -186,13 +182,13 @@ def egos(problems: Sequence[Problem], cars: int, net: Ints) -> Drivers:
     rounds = [stages(problem.network, problem.goal_vertices) for problem in problems]
     lanes = max((far.shape[1] for _, far in rounds), default=0)
     stage: list[int] = []
-    distance = np.full((sum(len(own) for own, _ in rounds), lanes), np.inf)
-    for b, ((own, far), problem) in enumerate(zip(rounds, problems, strict=True)):
+    distance = np.full((sum(len(stages) for stages, _ in rounds), lanes), np.inf)
+    for b, ((ways, far), problem) in enumerate(zip(rounds, problems, strict=True)):
         ego = rows[b, EGO]
-        ego.kind, ego.first, ego.last = KIND.ROUND, len(stage), len(stage) + len(own)
+        ego.kind, ego.first, ego.last = KIND.ROUND, len(stage), len(stage) + len(ways)
         ego.speed = problem.car.bounds.speed
-        distance[len(stage) : len(stage) + len(own), : far.shape[1]] = far
-        stage += own.tolist()
+        distance[len(stage) : len(stage) + len(ways), : far.shape[1]] = far
+        stage += ways.tolist()
     return Drivers(
         active=np.ones(trials, dtype=np.int64),
         net=net,

@@ -49,8 +49,8 @@ def drive_alone(b: int, tick: int, lane: int, pose: Pose, traffic: Traffic, shie
     alone, commands = shields.alone.traffic, shields.alone.commands
     alone.state.x[b, EGO], alone.state.y[b, EGO], alone.state.c[b, EGO], alone.state.s[b, EGO] = pose
     bits = FLAG.LEFT | FLAG.OVERTAKING
-    own, _ = lane_coordinates(roads, drivers.net[b], lane, pose.x, pose.y)
-    if _blocks(b, lane, own, own + shields.ego[b].blocked_ahead, roads, drivers, shields):
+    here, _ = lane_coordinates(roads, drivers.net[b], lane, pose.x, pose.y)
+    if _blocks(b, lane, here, here + shields.ego[b].blocked_ahead, roads, drivers, shields):
         bits |= FLAG.BLOCKED
     alone.labels.bits[b, EGO] = bits
     alone.labels.lane[b, EGO] = lane

@@ -43,9 +43,7 @@ class Embedded:
         """
         rates = {instance.problem.rate for instance in instances}
         if len(rates) != 1:
-            raise InputError(
-                "a batch has one control rate", field="rate", value=sorted(rates), expected="one"
-            )
+            raise InputError("a batch has one control rate", field="rate", value=sorted(rates), expected="one")
         self._rate = rates.pop()
         counts = [len(instance.starts) for instance in instances]
         places = -(-max(counts) // grain) * grain
@@ -99,9 +97,7 @@ class Embedded:
 
     def _models(self, instances: Sequence[Instance]) -> ModelledCars | None:
         """Return the `Modelled` that moves cars of another model, None for Dubins cars; it takes a single trial."""
-        others = [
-            instance.problem.car.model for instance in instances if instance.problem.car.model != DUBINS
-        ]
+        others = [instance.problem.car.model for instance in instances if instance.problem.car.model != DUBINS]
         if not others:
             return None
         if len(instances) > 1:

@@ -74,21 +74,21 @@ class ModelledCars:
         cuts = self._cuts(plans)
         self._stands[:] = 0
         moved = np.zeros(len(plans), dtype=bool)
-        found: list[Contact] = []
+        contacts: list[Contact] = []
         for begin, end in pairwise(cuts):
             middle = 0.5 * (begin + end)
             for n, plan in enumerate(plans):
                 self._arcs[0, n] = plan.at(middle)
             self._part(end - begin)
             for meeting in self.motion.work.meetings():
-                found.append(_later(contact_of(meeting), begin, moved))
+                contacts.append(_later(contact_of(meeting), begin, moved))
             moved |= self._moves()
             self._stands |= self.motion.work.until[: len(plans)] < end - begin
         for n in np.flatnonzero(self._stands):
             model = self._models[n]
             if isinstance(model, Stops):
                 self._answer(int(n), "stop", model.stop)
-        return tuple(found)
+        return tuple(contacts)
 
     def _take(self, commands: Floats) -> None:
         """Clip the commands in place, by the models and then by the bounds."""
@@ -173,6 +173,4 @@ class _Plan:
 def _later(contact: Contact, seconds: float, moved: Any) -> Contact:
     """Return a contact of a part as one of the tick; `moved` (N,) tells which cars have moved before in it."""
     other = contact.moved[1] or (contact.other >= 0 and bool(moved[contact.other]))
-    return replace(
-        contact, time=contact.time + seconds, moved=(contact.moved[0] or bool(moved[contact.car]), other)
-    )
+    return replace(contact, time=contact.time + seconds, moved=(contact.moved[0] or bool(moved[contact.car]), other))

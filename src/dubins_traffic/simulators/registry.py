@@ -42,6 +42,4 @@ def load(name: str, *, show: bool = False) -> Simulator:
         return Embedded()
     if name in _DESCRIPTIONS:
         return ABOVE.parts("simulators")[name]()(show=show)
-    raise InputError(
-        "unknown simulator", field="simulator", value=name, expected=f"one of {', '.join(_DESCRIPTIONS)}"
-    )
+    raise InputError("unknown simulator", field="simulator", value=name, expected=f"one of {', '.join(_DESCRIPTIONS)}")

@@ -104,18 +104,18 @@ def gr1(
         side = environment if place < len(assumptions) else system
         for part in parts(formula):
             _Sorter(side, period, taken).sort(simplify(part))
-    own = set(environment.variables)
+    variables = set(environment.variables)
     for formula in environment.first:
-        _keep_to(own, propositions(formula), formula, "first")
+        _keep_to(variables, propositions(formula), formula, "first")
     for formula in environment.step:
         ahead = {name for part in subformulas(formula) if part.op is Op.X for name in propositions(part)}
-        _keep_to(own, sorted(ahead), formula, "next")
+        _keep_to(variables, sorted(ahead), formula, "next")
     return GR1(environment, system)
 
 
-def _keep_to(own: set[str], names: Sequence[str], formula: Formula, when: str) -> None:
+def _keep_to(variables: set[str], names: Sequence[str], formula: Formula, when: str) -> None:
     for name in names:
-        if name not in own:
+        if name not in variables:
             raise FormulaError(
                 f"an assumption restricts what the system chooses {when}",
                 value=str(formula),
@@ -225,9 +225,7 @@ def _temporal(formula: Formula) -> bool:
 
 def _is_step(formula: Formula) -> bool:
     """Say whether the only temporal operator is next, nowhere inside another next."""
-    return all(
-        part.op is Op.X and not _temporal(part.args[0]) for part in subformulas(formula) if part.op in FUTURE
-    )
+    return all(part.op is Op.X and not _temporal(part.args[0]) for part in subformulas(formula) if part.op in FUTURE)
 
 
 def _style(counters: Sequence[Counter]) -> Style:

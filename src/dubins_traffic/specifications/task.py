@@ -119,32 +119,30 @@ def _rules_2_and_3(name: str, crossings: Iterable[Point], rules: RuleParameters)
         enter, stopped, ahead, clear = (
             prop(_on(f"{word}_{name}", point)) for word in ("enter", "stopped", "ahead", "clear")
         )
-        found += [
-            always(implies(enter, yesterday(condition))) for condition in (stopped, negation(ahead), clear)
-        ]
+        found += [always(implies(enter, yesterday(condition))) for condition in (stopped, negation(ahead), clear)]
     return found
 
 
 def _assumed(name: str, crossings: Sequence[Point], rules: RuleParameters) -> list[Formula]:
     """Return E1 to E5 for an e-agent, those that the problem assumes."""
-    found: list[Formula] = []
+    formulas: list[Formula] = []
     if rules.assume_e1 and rules.exceptions:
-        found.append(always(negation(prop(f"excess_{name}"))))
+        formulas.append(always(negation(prop(f"excess_{name}"))))
     elif rules.assume_e1:
-        found += [_stays_on_road(name), *_rules_2_and_3(name, crossings, rules)]
+        formulas += [_stays_on_road(name), *_rules_2_and_3(name, crossings, rules)]
     if rules.assume_e2:
-        found.append(always(negation(prop(f"at_fault_{name}"))))
+        formulas.append(always(negation(prop(f"at_fault_{name}"))))
     if rules.assume_e3:
         for point in crossings:
             goes = conj(prop(_on(f"first_{name}", point)), prop(_on(f"clear_{name}", point)))
-            found.append(_no_longer(goes, rules.enter_time))
-        found.append(always(negation(prop(f"renewed_{name}"))))
+            formulas.append(_no_longer(goes, rules.enter_time))
+        formulas.append(always(negation(prop(f"renewed_{name}"))))
     if rules.assume_e4:
-        found.append(_no_longer(prop(f"exit_{name}"), rules.exit_time))
-        found.append(always(negation(prop(f"stays_{name}"))))
+        formulas.append(_no_longer(prop(f"exit_{name}"), rules.exit_time))
+        formulas.append(always(negation(prop(f"stays_{name}"))))
     if rules.assume_e5:
-        found.append(always(negation(prop(f"overdue_{name}"))))
-    return found
+        formulas.append(always(negation(prop(f"overdue_{name}"))))
+    return formulas
 
 
 def _no_longer(state: Formula, seconds: float) -> Formula:

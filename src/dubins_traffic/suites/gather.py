@@ -27,9 +27,7 @@ def gather(name: str, title: str, folder: Path) -> dict[str, Any]:
     files = sorted(folder.rglob("*.json"))
     if not files:
         raise InputError("no case in it", file=str(folder), expected="files *.json that `falsify` wrote")
-    entries = [
-        {"name": _name(path, folder), "document": parse_json(read_text(path), str(path))} for path in files
-    ]
+    entries = [{"name": _name(path, folder), "document": parse_json(read_text(path), str(path))} for path in files]
     document = {"version": 0, "name": name, "title": title, "cases": entries}
     case_instances(Suite.from_document(document, str(folder)).model.cases or ())
     return document

@@ -48,9 +48,7 @@ class TrialsEntry(Strict):
         default=None,
         description="where it ran: in process (trusted), in a box, or told to be trusted; null: not said",
     )
-    columns: Columns = Field(
-        description="columns of the campaign's table, one value a trial, cell after cell"
-    )
+    columns: Columns = Field(description="columns of the campaign's table, one value a trial, cell after cell")
 
     @model_validator(mode="after")
     def _of_one_length(self) -> TrialsEntry:
@@ -104,9 +102,7 @@ class WallModel(Strict):
     entries: dict[str, dict[str, list[Any]]] = Field(
         default={}, description="of each controller, columns of seconds, one value a trial"
     )
-    solvers: dict[str, dict[str, Seconds]] = Field(
-        default={}, description="of each solver, seconds for each game"
-    )
+    solvers: dict[str, dict[str, Seconds]] = Field(default={}, description="of each solver, seconds for each game")
 
 
 def file_name(suite: Suite, trials: int | None) -> str:
@@ -123,9 +119,7 @@ def save_trials(suite: Suite, campaign: Campaign, folder: Path) -> Path:
     entries: list[dict[str, Any]] = []
     seconds: dict[str, dict[str, Any]] = {}
     for k, name in enumerate(campaign.controllers):
-        places_of_one = [
-            place for place, one in enumerate(results_table["controller"].to_pylist()) if one == name
-        ]
+        places_of_one = [place for place, one in enumerate(results_table["controller"].to_pylist()) if one == name]
         picked, times = results_table.take(places_of_one), clock.take(places_of_one)
         share = [STRATEGY_SHARE] if STRATEGY_SHARE in results_table.column_names else []
         columns = played({column: picked[column].to_pylist() for column in (*KEPT, *share)})
@@ -176,9 +170,7 @@ def find_results(place: str) -> Path:
     files_of_results = [each for each in sorted(path.glob("*.json")) if _is_result(each)]
     if len(files_of_results) != 1:
         problem = "several files of results" if files_of_results else "no results of a suite"
-        raise InputError(
-            problem, file=place, expected="the folder of `suite run` when it is finished, or a file"
-        )
+        raise InputError(problem, file=place, expected="the folder of `suite run` when it is finished, or a file")
     return files_of_results[0]
 
 
@@ -254,9 +246,7 @@ def _check_words(column: str, values: Sequence[Any]) -> None:
     wrong = [value for value in values if not _is_word(column, value)]
     if wrong:
         expected = ", ".join(OF_SIMULATED) + " or null" if column == "verdict" else "how each trial ended"
-        raise InputError(
-            "a column of other values", field=f"columns.{column}", value=wrong[0], expected=expected
-        )
+        raise InputError("a column of other values", field=f"columns.{column}", value=wrong[0], expected=expected)
 
 
 def _is_word(column: str, value: object) -> bool:
@@ -420,9 +410,7 @@ def where_they_ran(sources: Sequence[Source]) -> str:
 
 def _part(campaign: Campaign, index: int, one: Named) -> Any:
     """Return the trials of an entry with the numbers that they have in a campaign, as controller number `index`."""
-    numbers = [
-        cell.first + index * cell.count + trial for cell in campaign.cells for trial in range(cell.count)
-    ]
+    numbers = [cell.first + index * cell.count + trial for cell in campaign.cells for trial in range(cell.count)]
     wall = one.source.wall
     seconds = None if wall is None else wall.entries.get(one.entry.controller)
     try:

@@ -67,9 +67,7 @@ def case_instances(entries: Sequence[CaseEntry]) -> dict[str, Instance]:
     names: dict[str, str] = {}
     for name, instance in instances.items():
         if (other := names.setdefault(_key(instance), name)) != name:
-            raise InputError(
-                "the same case twice", field="cases", value=name, expected=f"one other than {other}"
-            )
+            raise InputError("the same case twice", field="cases", value=name, expected=f"one other than {other}")
     return instances
 
 
@@ -103,9 +101,7 @@ def run_cases(
         file = folder / CASES_FILE
         known = _kept_cases(file, suite) if file.exists() else {}
         if file.exists() and not resume:
-            raise InputError(
-                "holds results", file=str(folder), expected="a new folder; --resume goes on with it"
-            )
+            raise InputError("holds results", file=str(folder), expected="a new folder; --resume goes on with it")
         _run(suite, file, instances, specs, known, workers, progress or (lambda _done, _total: None))
         named = {bare_name(spec): known[bare_name(spec)] for spec in specs}
         columns = {
@@ -121,10 +117,7 @@ def run_cases(
             }
             for (name, its_columns), spec in zip(columns.items(), specs, strict=True)
         ]
-        seconds = {
-            name: {column: its_columns[column] for column in rows.WALL}
-            for name, its_columns in columns.items()
-        }
+        seconds = {name: {column: its_columns[column] for column in rows.WALL} for name, its_columns in columns.items()}
         return save(suite, folder, {"entries": listed}, {"entries": seconds})
 
 
@@ -314,9 +307,7 @@ def run_games(
         file = folder / GAMES_FILE
         answers = _kept_games(file, suite, solver) if file.exists() else {}
         if file.exists() and not resume:
-            raise InputError(
-                "holds answers", file=str(folder), expected="a new folder; --resume goes on with it"
-            )
+            raise InputError("holds answers", file=str(folder), expected="a new folder; --resume goes on with it")
         for k, entry in enumerate(games):
             if progress is not None:
                 progress(k, len(games))
@@ -335,13 +326,9 @@ def run_games(
         )
 
 
-def _keep_games(
-    file: Path, suite: Suite, solver: Solver, answers: dict[str, tuple[GameResult, float]]
-) -> None:
+def _keep_games(file: Path, suite: Suite, solver: Solver, answers: dict[str, tuple[GameResult, float]]) -> None:
     lines: list[dict[str, Any]] = [{"hash": suite.hash, "solver": solver.name, "command": solver.command}]
-    lines += [
-        {"game": name, "seconds": s, "answer": result.model_dump()} for name, (result, s) in answers.items()
-    ]
+    lines += [{"game": name, "seconds": s, "answer": result.model_dump()} for name, (result, s) in answers.items()]
     write_text(file, "".join(json.dumps(line) + "\n" for line in lines))
 
 
@@ -352,9 +339,7 @@ def _kept_games(file: Path, suite: Suite, solver: Solver) -> dict[str, tuple[Gam
         head = {"hash": suite.hash, "solver": solver.name, "command": solver.command}
         if first != head:
             raise InputError("answers of another suite or solver", file=str(file), expected="a new folder")
-        return {
-            each["game"]: (GameResult.model_validate(each["answer"]), float(each["seconds"])) for each in rest
-        }
+        return {each["game"]: (GameResult.model_validate(each["answer"]), float(each["seconds"])) for each in rest}
     except (ValueError, KeyError, TypeError):
         raise InputError("can't be read as answers", file=str(file), expected="a new folder") from None
 
@@ -424,8 +409,7 @@ def seated(specs: Sequence[str]) -> tuple[list[str], str]:
     strangers = [
         spec
         for spec in specs
-        if controllers_by_name.ran(spec) == controllers_by_name.IN_PROCESS
-        and not controllers_by_name.is_ours(spec)
+        if controllers_by_name.ran(spec) == controllers_by_name.IN_PROCESS and not controllers_by_name.is_ours(spec)
     ]
     if not strangers:
         return list(specs), ""

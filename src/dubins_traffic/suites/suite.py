@@ -41,9 +41,7 @@ class GameEntry(Strict):
     )
     cars: Annotated[int, Field(ge=1)] = Field(description="e-agents")
     assume: str = Field(description="what is assumed of them, as `synth --assume` takes it; empty: nothing")
-    order_degree: Annotated[int, Field(ge=1)] = Field(
-        description="intersections of so many roads are crossings"
-    )
+    order_degree: Annotated[int, Field(ge=1)] = Field(description="intersections of so many roads are crossings")
     positions: Count = Field(description="positions of the game")
     winning: Count = Field(description="positions from which the ego wins")
 
@@ -133,9 +131,7 @@ class Suite:
         """SHA-256 of all that determines problems and scores: without its title and the page's controllers."""
         decides = {name: value for name, value in self.document.items() if name not in _TOLD}
         if "campaign" in decides:
-            decides["campaign"] = {
-                name: value for name, value in decides["campaign"].items() if name != "controllers"
-            }
+            decides["campaign"] = {name: value for name, value in decides["campaign"].items() if name != "controllers"}
         return hashlib.sha256(json.dumps(decides, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
     @property

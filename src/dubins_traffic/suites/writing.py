@@ -144,11 +144,7 @@ def trials_table(suite: Suite, comparison: Comparison) -> str:
             _estimate(standing.estimates[metric.name]),
             shown(_sum(standing.estimates[metric.name])),
             _estimate(standing.estimates[SECOND]),
-            *(
-                [_clean_share(standing), *(_share(standing.verdicts.get(name)) for name in verdicts)]
-                if judged
-                else []
-            ),
+            *([_clean_share(standing), *(_share(standing.verdicts.get(name)) for name in verdicts)] if judged else []),
             str(standing.collisions),
             str(standing.faults["the ego"] + standing.faults["both"]),
             str(standing.ended.count),
@@ -203,10 +199,7 @@ def answers_of(suite: Suite, sources: Sequence[Source]) -> list[Answers]:
 
 def _case_lines(suite: Suite, columns_by_name: Mapping[str, Columns]) -> list[list[str]]:
     cases = suite.model.cases or ()
-    rows = [
-        [case.name, *(_said(columns, k) for columns in columns_by_name.values())]
-        for k, case in enumerate(cases)
-    ]
+    rows = [[case.name, *(_said(columns, k) for columns in columns_by_name.values())] for k, case in enumerate(cases)]
     ended = ["ended by the controller", *(str(_ended(columns)) for columns in columns_by_name.values())]
     return [*rows, ["clean", *(_clean(columns) for columns in columns_by_name.values())], ended]
 

@@ -38,8 +38,7 @@ def strengthenings(assumption: Assumption, count: int, *, bends: bool) -> Iterat
     for parts in combinations((part for part in words if ladders_of[part]), count):
         ladders = [ladders_of[part] for part in parts]
         yield (
-            Assumption.parse((word_of | dict(zip(parts, steps, strict=True))).values())
-            for steps in product(*ladders)
+            Assumption.parse((word_of | dict(zip(parts, steps, strict=True))).values()) for steps in product(*ladders)
         )
 
 
@@ -172,9 +171,7 @@ class Answer:
                 "their assumption. The strategy never does so, and gives these positions up."
             )
         if self.route_bound > 0:
-            lines_of_text.append(
-                f"On shortest routes it is proved to win against up to {_e_agents(self.route_bound)}."
-            )
+            lines_of_text.append(f"On shortest routes it is proved to win against up to {_e_agents(self.route_bound)}.")
         return lines_of_text
 
     def explain(self, progress: Progress | None = None) -> list[str]:
@@ -271,7 +268,5 @@ def _with_bound(error: InputError, bound: int) -> InputError:
     """Return the refusal of a game that says what is known without it."""
     if bound <= 0:
         return error
-    error.expected = (
-        f"{error.expected}; on shortest routes the ego is proved to win against up to {_e_agents(bound)}"
-    )
+    error.expected = f"{error.expected}; on shortest routes the ego is proved to win against up to {_e_agents(bound)}"
     return error

@@ -87,13 +87,9 @@ class Archive:
         try:
             return _OBJECT.validate_json(text)
         except ValidationError:
-            raise InputError(
-                f"no {self._what}", field="header", expected=f"the header of a {self._what}"
-            ) from None
+            raise InputError(f"no {self._what}", field="header", expected=f"the header of a {self._what}") from None
 
-    def array(
-        self, name: str, kind: type[np.generic], most: int, *, exactly: bool = False
-    ) -> npt.NDArray[Any]:
+    def array(self, name: str, kind: type[np.generic], most: int, *, exactly: bool = False) -> npt.NDArray[Any]:
         """Return one array of whole numbers, in one row.
 
         Parameters
@@ -115,22 +111,16 @@ class Archive:
         try:
             member = self._zip.getinfo(f"{name}.npy")
         except KeyError:
-            raise InputError(
-                f"no {self._what}", field=name, expected=f"the arrays of a {self._what}"
-            ) from None
+            raise InputError(f"no {self._what}", field=name, expected=f"the arrays of a {self._what}") from None
         room = most * WIDEST + SPARE
         if member.file_size > room:
-            raise InputError(
-                "too large", field=name, value=f"{member.file_size} bytes", expected=f"at most {room}"
-            )
+            raise InputError("too large", field=name, value=f"{member.file_size} bytes", expected=f"at most {room}")
         numbers = self._read(lambda: self._array(member, name, kind, most))
         if exactly and len(numbers) != most:
             raise InputError("of another size", field=name, value=len(numbers), expected=f"{most} numbers")
         return numbers
 
-    def _array(
-        self, member: zipfile.ZipInfo, name: str, kind: type[np.generic], most: int
-    ) -> npt.NDArray[Any]:
+    def _array(self, member: zipfile.ZipInfo, name: str, kind: type[np.generic], most: int) -> npt.NDArray[Any]:
         with self._zip.open(member) as stream:
             version = np.lib.format.read_magic(stream)
             if version != (1, 0):

@@ -131,9 +131,7 @@ class Board:
 
     @cached_property
     def _kinds(self) -> list[NodeKind]:
-        return [
-            NodeKind.of(len(node.inbound), node.crossing, self.assumption) for node in self.road_cells.nodes
-        ]
+        return [NodeKind.of(len(node.inbound), node.crossing, self.assumption) for node in self.road_cells.nodes]
 
     @cached_property
     def sceneries(self) -> dict[NodeKind, Scenery]:
@@ -182,9 +180,7 @@ class Board:
         for left in range(self.others + 1):
             for ego in (0, 1):
                 sizes = [
-                    after[left - scene.others][ego - scene.egos]
-                    if scene.others <= left and scene.egos <= ego
-                    else 0
+                    after[left - scene.others][ego - scene.egos] if scene.others <= left and scene.egos <= ego else 0
                     for scene in self.scenery(node).scenes
                 ]
                 rows[left, ego, 1:] = np.cumsum(sizes)[:-1]
@@ -213,9 +209,7 @@ class Board:
             **self._changes(),
             sorts=_ints(kind.ordered for kind in self._kinds),
             newcomer=_ints(WHO.PARKED if kind.parks else WHO.OTHER for kind in self._kinds),
-            renewed=_ints(
-                WHO.RENEWED if kind.forfeits is Forfeits.ONCE else WHO.OTHER for kind in self._kinds
-            ),
+            renewed=_ints(WHO.RENEWED if kind.forfeits is Forfeits.ONCE else WHO.OTHER for kind in self._kinds),
             goal=_ints(self._goal_of(node.vertex) for node in nodes),
             goal_nodes=_ints(len(nodes_of_goal) for nodes_of_goal in self.road_cells.goal_nodes),
             crossing=_ints(node.crossing for node in nodes),
@@ -243,9 +237,7 @@ class Board:
                 tables_of_kinds.setdefault(name, []).append(row)
             for name, changed in (("entered", of_kind.entered()), ("removed", of_kind.removed())):
                 tables_of_kinds.setdefault(name, []).append(_wider(changed, ((0, 0), (0, pad))))
-            tables_of_kinds.setdefault("arrived", []).append(
-                _wider(of_kind.arrived(), ((0, 0), (0, pad), (0, 0)))
-            )
+            tables_of_kinds.setdefault("arrived", []).append(_wider(of_kind.arrived(), ((0, 0), (0, pad), (0, 0))))
         return {name: np.concatenate(parts) for name, parts in tables_of_kinds.items()}
 
     def _goal_of(self, vertex: int) -> int:
@@ -262,9 +254,7 @@ class Board:
             raise KeyError("other cars than those of the game")
         for n, scene in enumerate(scenes):
             start = int(self.tables.offset_at[n])
-            total += int(
-                self.tables.offset[start + (left * 2 + ego) * len(self.scenery(n).scenes) + numbers[n]]
-            )
+            total += int(self.tables.offset[start + (left * 2 + ego) * len(self.scenery(n).scenes) + numbers[n]])
             left, ego = left - scene.others, ego - scene.egos
         return total
 

@@ -292,11 +292,7 @@ def _line(board: Board, cycle: Sequence[Moment], car: int) -> str:
     if len(cells) > 1:
         return f"  e-agent {car} goes by {_names(road_cells, cells)}"
     cell = cells[0]
-    why = (
-        _excuse_inside(board, cycle, cell)
-        if cell < len(road_cells.nodes)
-        else _excuse_lane(board, cycle, cell)
-    )
+    why = _excuse_inside(board, cycle, cell) if cell < len(road_cells.nodes) else _excuse_lane(board, cycle, cell)
     return f"  e-agent {car} holds {road_cells.name(cell)}: {why}"
 
 
@@ -343,9 +339,7 @@ def _excuse_bend(board: Board, cycle: Sequence[Moment], node: int) -> str:
     closing = {moment.cells.index(lane) for moment in cycle for lane in exits if lane in moment.cells}
     alone = board.assumption.arrives is Arriving.MOVES_UP
     if EGO_CAR in closing or (closing and not alone):
-        return (
-            f"again and again {_cars(closing)} {_is(closing)} in the way out of {board.road_cells.name(node)}"
-        )
+        return f"again and again {_cars(closing)} {_is(closing)} in the way out of {board.road_cells.name(node)}"
     if met and not alone and board.assumption.leaves is Leaving.UNMET:
         return f"again and again {_cars(met)} {_is(met)} in the bend before it"
     return ""

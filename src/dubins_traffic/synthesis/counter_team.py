@@ -84,7 +84,7 @@ class CounterTeam:
         self._targets = [-1] * len(instance.starts)
         self._scenes: list[Scene] = []
         self._jumps = board.assumption.order is not Order.KEPT
-        self._times = [round(own * problem.rate) for own in _times(board, rules)]
+        self._times = [round(seconds * problem.rate) for seconds in _times(board, rules)]
         self._since: dict[int, int] = {}
         follows = isinstance(self._guide, FollowedPlay)
         told = "a counter-play is followed" if follows else f"assumed: {board.assumption}"
@@ -108,8 +108,8 @@ class CounterTeam:
         """Return, once, a description of how the team keeps the ego from a goal."""
         if not self._reports:
             return ()
-        found, self._reports = self._reports, []
-        return found
+        reports, self._reports = self._reports, []
+        return reports
 
     def reseed(self, seed: int) -> None:
         """Let what is drawn from now on follow from another seed."""
@@ -165,19 +165,19 @@ class CounterTeam:
         """Let the law take a car to its target."""
         road_cells, cells = self._board.road_cells, self._play.cells
         nodes = len(road_cells.nodes)
-        target, own = self._targets[car.car], cells[car.car]
+        target, cell = self._targets[car.car], cells[car.car]
         own_car = self._drivers.car[0, car.car]
         prices = self._drivers.distance[car.car]
-        if target < nodes and own >= nodes:
+        if target < nodes and cell >= nodes:
             free = [lane for lane in road_cells.nodes[target].exits if nodes + lane not in cells]
             liked = free or list(road_cells.nodes[target].exits)
-        elif target >= nodes and own < nodes and not self._is_turning(car, own):
+        elif target >= nodes and cell < nodes and not self._is_turning(car, cell):
             liked = [target - nodes]
         else:
             return
         prices[:] = NOT_LIKED
         prices[liked] = 0.0
-        v = road_cells.nodes[target if target < nodes else own].vertex
+        v = road_cells.nodes[target if target < nodes else cell].vertex
         if own_car.lane >= 0 and road_cells.network.lane_ends(int(own_car.lane))[1] == v:
             own_car.next_lane = liked[0]
 
@@ -210,16 +210,15 @@ def _times(board: Board, rules: RuleParameters) -> list[float]:
     """Return the time that the rules allow for each debt, seconds: of nodes, then lanes, then goals."""
     road_cells = board.road_cells
     lanes = [
-        rules.enter_time if road_cells.nodes[node].crossing else rules.rest_time
-        for node, _ in road_cells.lane_end
+        rules.enter_time if road_cells.nodes[node].crossing else rules.rest_time for node, _ in road_cells.lane_end
     ]
     return [*[rules.exit_time] * len(road_cells.nodes), *lanes, *[rules.goal_time] * len(road_cells.goals)]
 
 
 def _assumed(instance: Instance) -> Assumption:
     """Return which rules the team keeps: as its cars' parameters say, or as the problem assumes."""
-    own = _common(instance, "assume", "make the same assumption")
-    assumed = assumption_of(instance.problem) if own is None else Assumption.parse(own.split(","))
+    agreed = _common(instance, "assume", "make the same assumption")
+    assumed = assumption_of(instance.problem) if agreed is None else Assumption.parse(agreed.split(","))
     if not assumed.yields:
         raise InputError("they ram nobody", field="assume", value=str(assumed), expected="E2 among them")
     return assumed
@@ -237,13 +236,13 @@ def _followed(instance: Instance, board: Board) -> FollowedPlay | None:
 
 def _common(instance: Instance, name: str, must: str) -> Any:
     """Return the parameter that all cars of a team have alike; InputError, which says what they `must` do, if not."""
-    own, *others = (agent.parameters[name] for agent in instance.e_agents)
-    if any(other != own for other in others):
+    first, *others = (agent.parameters[name] for agent in instance.e_agents)
+    if any(other != first for other in others):
         raise InputError(
             f"the e-agents of one team must {must}", field=name,
-            value=sorted({str(own), *map(str, others)}), expected="equal values for all e-agents of the kind counter",
+            value=sorted({str(first), *map(str, others)}), expected="equal values for all e-agents of the kind counter",
         )  # fmt: skip
-    return own
+    return first
 
 
 def _drivers(instance: Instance) -> Drivers:

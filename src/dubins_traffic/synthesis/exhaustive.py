@@ -123,11 +123,9 @@ class CounterPlay:
 
     def trial(self, instance: Instance) -> Instance:
         """Return an instance in which the e-agents drive by this play: all of them are of the kind `counter`."""
-        own: dict[str, Any] = {"turns": [list(cells) for cells in self.turns], "again": self.again}
-        parameters = parameters_of(COUNTER, own)
-        agents = (
-            replace(agent, kind=COUNTER, type=COUNTER, parameters=parameters) for agent in instance.e_agents
-        )
+        play: dict[str, Any] = {"turns": [list(cells) for cells in self.turns], "again": self.again}
+        parameters = parameters_of(COUNTER, play)
+        agents = (replace(agent, kind=COUNTER, type=COUNTER, parameters=parameters) for agent in instance.e_agents)
         return replace(instance, e_agents=tuple(agents))
 
     def lines(self, game: Game) -> list[str]:
@@ -195,17 +193,13 @@ class _Graph:
 
     places: list[PlayPosition] = field(default_factory=list[PlayPosition])
     memories: list[Memory] = field(default_factory=list[Memory])
-    parents: list[tuple[int, PlayPosition | None]] = field(
-        default_factory=list[tuple[int, PlayPosition | None]]
-    )
+    parents: list[tuple[int, PlayPosition | None]] = field(default_factory=list[tuple[int, PlayPosition | None]])
     """The node from which each was reached first, -1 for a start, and the place that the environment made then."""
     sources: list[int] = field(default_factory=list[int])
     targets: list[int] = field(default_factory=list[int])
     between: list[PlayPosition] = field(default_factory=list[PlayPosition])
     """Of each move, where it leads from and to, and the place that the environment made."""
-    ends: list[tuple[int, PlayPosition | None, str]] = field(
-        default_factory=list[tuple[int, PlayPosition | None, str]]
-    )
+    ends: list[tuple[int, PlayPosition | None, str]] = field(default_factory=list[tuple[int, PlayPosition | None, str]])
     """The nodes at which plays end, the place that the environment made, and why."""
 
 
@@ -349,10 +343,7 @@ class _Lost:
         self._targets = [
             np.isin([place.cells[EGO] for place in places], nodes) for nodes in game.board.road_cells.targets
         ]
-        owed = [
-            game.owed[game.owed_at[place.position] : game.owed_at[place.position + 1]].tolist()
-            for place in places
-        ]
+        owed = [game.owed[game.owed_at[place.position] : game.owed_at[place.position + 1]].tolist() for place in places]
         self.debts = sorted({debt for debts in owed for debt in debts})
         self.unowed = {debt: np.array([debt not in debts for debts in owed]) for debt in self.debts}
 

@@ -161,13 +161,9 @@ def estimate(board: Board) -> Estimate:
         )  # fmt: skip
     count = board.positions
     if count == 0:
-        raise InputError(
-            "more cars than cells", value=board.others + 1, expected=f"at most {board.road_cells.cells}"
-        )
+        raise InputError("more cars than cells", value=board.others + 1, expected=f"at most {board.road_cells.cells}")
     if count >= MOST_POSITIONS:
-        raise InputError(
-            "too large a game", value=f"{count} positions", expected=f"less than {MOST_POSITIONS}"
-        )
+        raise InputError("too large a game", value=f"{count} positions", expected=f"less than {MOST_POSITIONS}")
     sizes = np.zeros(3)
     picked = np.unique(np.linspace(0, count - 1, min(SAMPLE, count)).astype(np.int64))
     work, out = Work.of(board), room(board, 1, LARGEST_CHOICE)
@@ -187,9 +183,7 @@ def estimate(board: Board) -> Estimate:
     return Estimate(count, int(moves), int(PROGRAM + SPARE * whole), int(PROGRAM + SPARE * lean))
 
 
-def build(
-    board: Board, *, limit: int | None = None, progress: Progress | None = None, workers: int = WORKERS
-) -> Game:
+def build(board: Board, *, limit: int | None = None, progress: Progress | None = None, workers: int = WORKERS) -> Game:
     """Return the game on a board.
 
     Parameters

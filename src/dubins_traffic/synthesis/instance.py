@@ -79,9 +79,7 @@ def start_cells(board: Board, instance: Instance) -> list[int]:
     for k, cell in enumerate(cells):
         if cell in cells[:k]:
             name = board.road_cells.name(cell)
-            raise InputError(
-                "two cars start in one cell", field="starts", value=name, expected="one car a cell"
-            )
+            raise InputError("two cars start in one cell", field="starts", value=name, expected="one car a cell")
     return cells
 
 
@@ -93,9 +91,7 @@ def cell_of(road_cells: RoadCells, problem: Problem, pose: Pose) -> int:
     heading = np.array([np.cos(pose.theta), np.sin(pose.theta)])
     if distances.item() < problem.intersection_radius:
         nodes = road_cells.nodes_of(int(vertices.item()))
-        return max(
-            nodes, key=lambda n: max(_along(road_cells, lane, heading) for lane in road_cells.nodes[n].exits)
-        )
+        return max(nodes, key=lambda n: max(_along(road_cells, lane, heading) for lane in road_cells.nodes[n].exits))
     segment = int(network.nearest_segment(place)[0].item())
     lanes = (2 * segment, 2 * segment + 1)
     gone = {lane: float(network.lane_coordinates(lane, place)[0].item()) for lane in lanes}

@@ -187,9 +187,7 @@ class Scenery:
 
     def left(self) -> Ints:
         """Return the scene (C,) after whoever is in the node has left it."""
-        return self._numbers(
-            [None if scene.inside is None else replace(scene, inside=None) for scene in self.scenes]
-        )
+        return self._numbers([None if scene.inside is None else replace(scene, inside=None) for scene in self.scenes])
 
     def entered(self) -> Ints:
         """Return the scene (C, slots) after the e-agent in a slot has entered."""
@@ -203,9 +201,7 @@ class Scenery:
         """Return the scene (C, slots) without the e-agent in a slot, which will take a new place in the order."""
         return self._by_slot(
             lambda scene, slot: (
-                scene.without(slot)
-                if (self._may_forfeit(scene) >> slot & 1) or slot in scene.parked
-                else None
+                scene.without(slot) if (self._may_forfeit(scene) >> slot & 1) or slot in scene.parked else None
             )
         )
 

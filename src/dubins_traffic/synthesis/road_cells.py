@@ -89,9 +89,7 @@ class RoadCells:
     @cached_property
     def lane_end(self) -> tuple[tuple[int, int], ...]:
         """Node and slot in which each lane ends."""
-        ends = {
-            lane: (n, slot) for n, node in enumerate(self.nodes) for slot, lane in enumerate(node.inbound)
-        }
+        ends = {lane: (n, slot) for n, node in enumerate(self.nodes) for slot, lane in enumerate(node.inbound)}
         return tuple(ends[lane] for lane in range(self.network.lanes))
 
     def nodes_of(self, vertex: int) -> tuple[int, ...]:
@@ -112,9 +110,7 @@ class RoadCells:
         """
         if len(self.goals) > 1:
             return self.goal_nodes
-        return *self.goal_nodes, tuple(
-            n for n, node in enumerate(self.nodes) if node.vertex not in self.goals
-        )
+        return *self.goal_nodes, tuple(n for n, node in enumerate(self.nodes) if node.vertex not in self.goals)
 
     def target_name(self, target: int) -> str:
         """Return how people call one of `targets`."""

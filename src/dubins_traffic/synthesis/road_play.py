@@ -123,9 +123,7 @@ class Ground:
         count = len(self.road_cells.nodes)
         reach = radius - margin
         points = (
-            [self._points[self.road_cells.nodes[cell].vertex]]
-            if cell < count
-            else self._hulls[(cell - count) >> 1]
+            [self._points[self.road_cells.nodes[cell].vertex]] if cell < count else self._hulls[(cell - count) >> 1]
         )
         return reach > 0.0 and all((x - pose.x) ** 2 + (y - pose.y) ** 2 < reach * reach for x, y in points)
 
@@ -381,9 +379,7 @@ class RoadPlay:
 
     def _note_move(self, car: int, old: int, cell: int) -> None:
         road_cells = self._board.road_cells
-        self.noted.append(
-            (UNKNOWN_MOVE, f"{self._names[car]} from {road_cells.name(old)} to {road_cells.name(cell)}")
-        )
+        self.noted.append((UNKNOWN_MOVE, f"{self._names[car]} from {road_cells.name(old)} to {road_cells.name(cell)}"))
 
     def _show(self, shown: dict[int, int], cells: dict[int, int]) -> None:
         """Put the cars that have come into view, and the ego if it is behind another, where they are."""
@@ -422,9 +418,7 @@ class RoadPlay:
             self._ticket[car] = tick
         elif renews_ticket(before, bits):
             self._ticket[car] = tick
-            self.noted.append(
-                (NEW_TICKET, f"{self._names[car]} in {self._board.road_cells.name(self.cells[car])}")
-            )
+            self.noted.append((NEW_TICKET, f"{self._names[car]} in {self._board.road_cells.name(self.cells[car])}"))
 
     def _number(self) -> int | None:
         """Return the number of the position in which the cars are, None if there is none."""

@@ -127,13 +127,9 @@ def specification(board: Board, starts: Sequence[int]) -> Specification:
             expected="at most 3, or the explicit graph",
         )
     if board.others > MOST_CARS:
-        raise InputError(
-            "too many e-agents for a specification", value=board.others, expected=f"at most {MOST_CARS}"
-        )
+        raise InputError("too many e-agents for a specification", value=board.others, expected=f"at most {MOST_CARS}")
     if len(starts) != board.others + 1 or len(set(starts)) != len(starts):
-        raise InputError(
-            "not starts of the game", value=str(list(starts)), expected="a cell of its own a car"
-        )
+        raise InputError("not starts of the game", value=str(list(starts)), expected="a cell of its own a car")
     return _Writer(board).specification(starts)
 
 
@@ -183,16 +179,11 @@ class _Writer:
         """Say that a car is in a cell next."""
         names = car_bits(car, self.board.road_cells.cells)
         return conj(
-            *(
-                next_(prop(name)) if cell >> bit & 1 else negation(next_(prop(name)))
-                for bit, name in enumerate(names)
-            )
+            *(next_(prop(name)) if cell >> bit & 1 else negation(next_(prop(name))) for bit, name in enumerate(names))
         )
 
     def _stays(self, car: int) -> Formula:
-        return conj(
-            *(iff(next_(prop(name)), prop(name)) for name in car_bits(car, self.board.road_cells.cells))
-        )
+        return conj(*(iff(next_(prop(name)), prop(name)) for name in car_bits(car, self.board.road_cells.cells)))
 
     def _among(self, car: int, cells: Iterable[int], *, later: bool = False) -> Formula:
         where = self._goes_to if later else self._at
@@ -206,9 +197,7 @@ class _Writer:
 
     def _crossings(self) -> list[int]:
         """Return the nodes at which several lanes end and an order is kept."""
-        return [
-            v for v in self._nodes if len(self._inbound(v)) > 1 and self.board.road_cells.nodes[v].crossing
-        ]
+        return [v for v in self._nodes if len(self._inbound(v)) > 1 and self.board.road_cells.nodes[v].crossing]
 
     def _may_wait_together(self, cell: int, other: int) -> bool:
         return any({cell, other} <= set(self._inbound(v)) for v in self._crossings())

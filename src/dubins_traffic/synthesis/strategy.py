@@ -60,18 +60,16 @@ class Strategy:
 
     def check_fit(self, road_cells: RoadCells, others: int) -> None:
         """Refuse the strategy for roads, goals or a number of e-agents other than its own (InputError)."""
-        own = self.board.road_cells
+        cells = self.board.road_cells
         differences = {
-            "network": own.network.to_document() != road_cells.network.to_document(),
-            "goals": set(own.goals) != set(road_cells.goals),
-            "order_degree": own.order_degree != road_cells.order_degree,
+            "network": cells.network.to_document() != road_cells.network.to_document(),
+            "goals": set(cells.goals) != set(road_cells.goals),
+            "order_degree": cells.order_degree != road_cells.order_degree,
             "cars": self.board.others != others,
         }
         for name, differ in differences.items():
             if differ:
-                raise InputError(
-                    "a strategy for another problem", field=name, expected="that of this problem"
-                )
+                raise InputError("a strategy for another problem", field=name, expected="that of this problem")
 
     def first(self) -> int:
         """Return the first position from which the strategy wins; InputError if there is none."""
@@ -176,9 +174,7 @@ def _ranks(archive: Archive, board: Board, target: int) -> Ranks:
     for name, table, end in (*tables, (f"debt_{target}", debt, debts)):
         low = 0 if table is start else -1
         if table.min(initial=0) < low or table.max(initial=-1) >= end:
-            raise InputError(
-                "tables of another game", field=name, expected=f"numbers from {low} to {end - 1}"
-            )
+            raise InputError("tables of another game", field=name, expected=f"numbers from {low} to {end - 1}")
     return Ranks(rank.astype(np.int32), start.astype(np.int32), debt.astype(np.int16))
 
 
@@ -187,9 +183,7 @@ def _header(archive: Archive) -> _Header:
     if header.get("format") != FORMAT:
         raise InputError("no strategy", field="format", value=header.get("format"), expected=FORMAT)
     if header.get("version") != VERSION:
-        raise InputError(
-            "of an unknown version", field="version", value=header.get("version"), expected=str(VERSION)
-        )
+        raise InputError("of an unknown version", field="version", value=header.get("version"), expected=str(VERSION))
     try:
         return _Header.model_validate(header)
     except ValidationError as error:
@@ -270,9 +264,7 @@ def advise(strategy: Strategy, play: RoadPlay, goal: int, following: int) -> Adv
     rank = strategy.ranks[goal].rank
     after = strategy.ranks[following if rank[inside] == 0 else goal].rank
     free = [
-        lane
-        for lane in board.road_cells.nodes[node].exits
-        if nodes + lane not in play.cells or nodes + lane == cell
+        lane for lane in board.road_cells.nodes[node].exits if nodes + lane not in play.cells or nodes + lane == cell
     ]
     ways = zip(free, play.moves.of_ego(inside)[1:], strict=True)
     ranked = sorted((int(after[then]), lane) for lane, then in ways if after[then] >= 0)

@@ -116,9 +116,7 @@ class Synthesized(Rules):
         )
         ego = drivers.car[0, EGO]
         ego.first, ego.last, ego.place = 0, 1, 0
-        self._drivers = drivers.replace(
-            stage=np.array([NO_GOAL]), distance=np.zeros((1, road_cells.network.lanes))
-        )
+        self._drivers = drivers.replace(stage=np.array([NO_GOAL]), distance=np.zeros((1, road_cells.network.lanes)))
         self._points: list[list[float]] = problem.network.points.tolist()
 
     def act(self, observation: Observation) -> Command:
@@ -141,8 +139,8 @@ class Synthesized(Rules):
         """Return the events of the play since the last call."""
         if self._pursuit is None or not self._pursuit.reports:
             return ()
-        found, self._pursuit.reports = self._pursuit.reports, []
-        return found
+        reports, self._pursuit.reports = self._pursuit.reports, []
+        return reports
 
     def _follow(self, pursuit: _Pursuit, seen: Observation) -> None:
         """Update the play to what is seen, and ask the strategy if the position has changed."""
@@ -194,9 +192,9 @@ class Synthesized(Rules):
     def _guarded(self, pursuit: _Pursuit, seen: Observation, command: Command) -> Command:
         """Return a command as the shield changes it."""
         given = self._shield_filter.filter(seen, command)
-        found = self._shield_filter.intervention
-        if found is not None:
-            pursuit.reports.append((SHIELD, override_text(found.asked, found.given, found.reason)))
+        intervention = self._shield_filter.intervention
+        if intervention is not None:
+            pursuit.reports.append((SHIELD, override_text(intervention.asked, intervention.given, intervention.reason)))
         return given
 
     def _waiting(self, pursuit: _Pursuit, seen: Observation, command: Command) -> Command:
@@ -238,10 +236,10 @@ def _sight(problem: Problem) -> Sight:
 
 def _ways(drivers: Drivers, arms: Sequence[Sequence[int]]) -> Floats:
     """Return `_Pursuit.ways`."""
-    found = drivers.distance.copy()
+    distance = drivers.distance.copy()
     for stage, lanes in enumerate(arms):
-        found[stage, list(lanes)] = drivers.distance[(stage + 1) % len(arms), list(lanes)]
-    return found
+        distance[stage, list(lanes)] = drivers.distance[(stage + 1) % len(arms), list(lanes)]
+    return distance
 
 
 def _adviser(strategy: Strategy | Machine | None, problem: Problem, *, fallback: bool) -> Adviser:

@@ -128,9 +128,7 @@ class ExternalWorld:
     def reset(self, instances: Sequence[Instance]) -> State:
         """Begin a trial where the cars stand; TransportError if one of them is not seen."""
         if len(instances) != 1:
-            raise InputError(
-                "a world outside has no batch", field="trials", value=len(instances), expected="1"
-            )
+            raise InputError("a world outside has no batch", field="trials", value=len(instances), expected="1")
         (self._instance,) = instances
         problem = self._instance.problem
         require_dubins(problem.car, "a world outside is known")
@@ -226,9 +224,7 @@ class ExternalWorld:
                     raise _lost(f"{name} jumped by {moved:.2f} m")
                 if self._is_frozen(n, seen, float(speed[n])):
                     raise _lost(f"the pose of {name} is frozen although it is told to drive")
-                turned = math.atan2(
-                    s * state.c[0, n] - c * state.s[0, n], c * state.c[0, n] + s * state.s[0, n]
-                )
+                turned = math.atan2(s * state.c[0, n] - c * state.s[0, n], c * state.c[0, n] + s * state.s[0, n])
                 ahead = (x - state.x[0, n]) * c + (y - state.y[0, n]) * s
                 state.speed[0, n], state.yaw_rate[0, n] = (
                     math.copysign(moved, ahead) / period,

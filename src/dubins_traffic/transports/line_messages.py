@@ -66,9 +66,7 @@ def command_of(message: dict[str, Any]) -> Answer | None:
     is the controller's fault, and the trial says so.
     """
     match message:
-        case {"command": [speed, yaw_rate], "tick": tick} if (
-            _plain(speed) and _plain(yaw_rate) and type(tick) is int
-        ):
+        case {"command": [speed, yaw_rate], "tick": tick} if _plain(speed) and _plain(yaw_rate) and type(tick) is int:
             try:
                 return Answer(float(speed), float(yaw_rate), tick, _reports(message.get("reports", [])))
             except OverflowError:
@@ -129,8 +127,7 @@ def observation_to_document(seen: Observation) -> dict[str, Any]:
         "twist": list(seen.twist),
         "propositions": list(seen.propositions),
         "others": [
-            [car.name, car.index, list(car.pose), list(car.twist), list(car.propositions)]
-            for car in seen.others
+            [car.name, car.index, list(car.pose), list(car.twist), list(car.propositions)] for car in seen.others
         ],
         "scan": None if seen.scan is None else seen.scan.tolist(),
     }

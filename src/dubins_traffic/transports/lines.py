@@ -76,9 +76,7 @@ class Lines:
         """Listen; TransportError if the port is taken."""
         self._mailbox = mailbox
         self._server = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
-        self._server.setsockopt(
-            socket.SOL_SOCKET, socket.SO_REUSEADDR, 1
-        )  # a session may follow another at once
+        self._server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)  # a session may follow another at once
         try:
             self._server.bind(("127.0.0.1", self._port))
             self._server.listen()

@@ -162,9 +162,7 @@ class Link:
             if self._repeated:
                 self._settle()
         elif self.clock.lockstep:
-            raise PeerError(
-                End.DEADLINE.value, f"no command within {until - self._sent:.3g} s at tick {tick}"
-            )
+            raise PeerError(End.DEADLINE.value, f"no command within {until - self._sent:.3g} s at tick {tick}")
         else:
             self._punctuality.missed(car)
             self._check_silence(slot, tick)
@@ -539,9 +537,7 @@ class RemoteAgents:
     def reset(self, instances: Sequence[Instance], state: State) -> None:  # noqa: ARG002  # nothing to begin with
         """Note which cars these are; a link drives one trial at a time."""
         (instance,) = instances
-        self._cars = [
-            (n, agent.name) for n, agent in enumerate(instance.e_agents, start=1) if agent.kind == REMOTE
-        ]
+        self._cars = [(n, agent.name) for n, agent in enumerate(instance.e_agents, start=1) if agent.kind == REMOTE]
 
     def decide(self, tick: int, state: State, labels: Labels, commands: Floats) -> None:  # noqa: ARG002
         """Write the commands of the remote e-agents."""

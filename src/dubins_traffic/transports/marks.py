@@ -63,9 +63,7 @@ def of_world(problem: Problem) -> list[Mark]:
             shown.append(Mark("obstacles", k, CYLINDER, size, BROWN, (obstacle.x, obstacle.y, 0.15)))
         else:
             corners = (*obstacle.vertices, obstacle.vertices[0])
-            shown.append(
-                Mark("obstacles", k, STRIP, (0.05, 0.0, 0.0), BROWN, (0.0, 0.0, 0.1), points=corners)
-            )
+            shown.append(Mark("obstacles", k, STRIP, (0.05, 0.0, 0.0), BROWN, (0.0, 0.0, 0.1), points=corners))
     return shown
 
 

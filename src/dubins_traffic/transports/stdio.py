@@ -62,9 +62,7 @@ class Child:
             )
         except OSError as error:
             raise TransportError(f"can't begin {command[0]}: {error.strerror}") from error
-        descriptors = [
-            stream.fileno() for stream in (self._process.stdin, self._process.stdout) if stream is not None
-        ]
+        descriptors = [stream.fileno() for stream in (self._process.stdin, self._process.stdout) if stream is not None]
         self.questions, self.answers = descriptors
         for each in descriptors:
             os.set_blocking(each, False)

@@ -114,19 +114,19 @@ def measured(
     """
     position = heading = interval = 0.0
     for samples in standing:
-        x, y = (np.array([getattr(own, name) for own in samples]) for name in ("x", "y"))
-        turned = np.unwrap([own.heading for own in samples])
+        x, y = (np.array([getattr(sample, name) for sample in samples]) for name in ("x", "y"))
+        turned = np.unwrap([sample.heading for sample in samples])
         position = max(position, float(np.abs(x - x.mean()).max()), float(np.abs(y - y.mean()).max()))
         heading = max(heading, float(np.abs(turned - turned.mean()).max()))
-        interval = max(interval, float(np.diff([own.time for own in samples]).max(initial=0.0)))
-    delays = [found for samples in turning if told and (found := delay_of(samples, told)) is not None]
+        interval = max(interval, float(np.diff([sample.time for sample in samples]).max(initial=0.0)))
+    delays = [delay for samples in turning if told and (delay := delay_of(samples, told)) is not None]
     return Measured(max(delays, default=None), position, heading, interval)
 
 
 def delay_of(samples: Sequence[Sample], told: Turned) -> float | None:
     """Return how late a car does what it was told, seconds, by least squares; None if it did not."""
-    times: Floats = np.array([own.time for own in samples])
-    turned: Floats = np.unwrap([own.heading for own in samples])
+    times: Floats = np.array([sample.time for sample in samples])
+    turned: Floats = np.unwrap([sample.heading for sample in samples])
     turned -= turned.mean()
     best, found, gain = math.inf, 0.0, 0.0
     for delay in np.arange(0.0, LATEST, STEP).tolist():

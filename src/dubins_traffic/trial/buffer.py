@@ -85,8 +85,8 @@ class FrameBuffer:
 
     def __init__(self, instances: Sequence[Instance], sinks: Sequence[Sequence[Sink]]) -> None:
         self._instances = tuple(instances)
-        self._sinks = [tuple(own) for own in sinks]
-        trials, cars = len(instances), max(len(own.starts) for own in instances)
+        self._sinks = [tuple(sink) for sink in sinks]
+        trials, cars = len(instances), max(len(instance.starts) for instance in instances)
         shape = trials, max(1, int(instances[0].problem.rate)), cars
         self._first = [0] * trials
         self._contacts: list[list[Contact]] = [[] for _ in instances]
@@ -99,15 +99,13 @@ class FrameBuffer:
         )
         self._all: Ints = np.arange(trials)
         self._keep = bound(keep)
-        for instance, own in zip(self._instances, self._sinks, strict=True):
-            for sink in own:
+        for instance, given_sinks in zip(self._instances, self._sinks, strict=True):
+            for sink in given_sinks:
                 sink.begin(instance)
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the state that a fork copies: all but the sinks that can't go on in a fork."""
-        carried = [
-            tuple(sink for sink in own if isinstance(sink, Forks) and sink.forks) for own in self._sinks
-        ]
+        carried = [tuple(sink for sink in sinks if isinstance(sink, Forks) and sink.forks) for sinks in self._sinks]
         return {**vars(self), "_sinks": carried}
 
     def fork(self, trials: Sequence[int], instances: Sequence[Instance]) -> FrameBuffer:
@@ -124,8 +122,7 @@ class FrameBuffer:
         twin._all = np.arange(len(rows))
         twin._keep = bound(keep)
         twin._sinks = [
-            forked(self._sinks[b], self._instances[b], instance)
-            for b, instance in zip(rows, instances, strict=True)
+            forked(self._sinks[b], self._instances[b], instance) for b, instance in zip(rows, instances, strict=True)
         ]
         return twin
 

@@ -57,9 +57,7 @@ class Seat:
         Wall-clock seconds of each call of its `act`.
     """
 
-    def __init__(
-        self, controller: Controller, deadline: float | None = None, *, linked: bool = False
-    ) -> None:
+    def __init__(self, controller: Controller, deadline: float | None = None, *, linked: bool = False) -> None:
         self.begin: float | None = None
         self.latencies: list[float] = []
         self._controller = controller
@@ -143,9 +141,7 @@ class Answerable:
     def __enter__(self) -> None:
         pass
 
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, _traceback: object
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, _traceback: object) -> None:
         self.end_forked()
         if isinstance(error, _TooLateError):
             raise _deadline_error(error.deadline, self.tick) from None

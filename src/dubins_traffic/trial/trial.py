@@ -120,9 +120,7 @@ class Trial:
     def advance(self, command: tuple[float, float]) -> Sequence[Contact]:
         """Step the trial as `step` does, but return the contacts of the tick and make no observation."""
         if self.ending is not None:
-            raise DubinsTrafficError(
-                f"the trial has ended ({self.ending.end}) and can't be stepped: make a new one"
-            )
+            raise DubinsTrafficError(f"the trial has ended ({self.ending.end}) and can't be stepped: make a new one")
         try:
             speed, yaw = self._line.take(self._tick, command)
         except ControllerError as error:

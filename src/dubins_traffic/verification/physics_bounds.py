@@ -105,9 +105,7 @@ def _summed(steps: Floats) -> Floats:
     return np.concatenate([np.zeros((1, steps.shape[1])), np.cumsum(steps, axis=0)])
 
 
-def _over(
-    what: str, values: Floats, limit: Floats | float, step: int, instance: Instance
-) -> Difference | None:
+def _over(what: str, values: Floats, limit: Floats | float, step: int, instance: Instance) -> Difference | None:
     most = np.broadcast_to(limit, values.shape)
     at = np.argwhere(values > most)
     if not len(at):

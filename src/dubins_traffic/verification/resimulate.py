@@ -88,9 +88,7 @@ def _report(trial: Trial, events: Sequence[Event]) -> None:
         trial.note(event.kind, event.detail)
 
 
-def _concluded(
-    record: Record, trial: Trial, witness: _Witness, reported: dict[int, list[Event]]
-) -> Difference | None:
+def _concluded(record: Record, trial: Trial, witness: _Witness, reported: dict[int, list[Event]]) -> Difference | None:
     """End the trial as the record says if that is possible, and return the first difference."""
     last = len(record.frames) - 1
     if trial.ending is not None and trial.tick < last:

@@ -73,11 +73,7 @@ class Verification:
         if self.difference is not None:
             return f"differs: {self.difference}{self._versions()}"
         early = "" if self.end is not None else f", ends early: cut off after tick {self.ticks}"
-        only = (
-            ""
-            if self.world == OURS
-            else f", in the world {self.world}: frames fit the bounds, contacts the poses"
-        )
+        only = "" if self.world == OURS else f", in the world {self.world}: frames fit the bounds, contacts the poses"
         score = "" if self.sheet is None else f", with its score in {self.sheet}"
         return f"verified{early}{only}{score}"
 
@@ -99,11 +95,7 @@ class Verification:
     def _versions(self) -> str:
         """Return the remark on a record of another version of the package, which may have given other results."""
         installed = version(PACKAGE)
-        return (
-            ""
-            if installed == self.written_by
-            else f" (written by {PACKAGE} {self.written_by}, this is {installed})"
-        )
+        return "" if installed == self.written_by else f" (written by {PACKAGE} {self.written_by}, this is {installed})"
 
 
 OURS = "embedded"

@@ -36,9 +36,7 @@ from dubins_traffic.verification.result import OURS, Difference, Verification
 def encoded(record: Record, head: bytes | None = None) -> bytes:
     """Return the file that writes what `record` holds after the header `head`, by default its own written anew."""
     stream = BytesIO()
-    encoder = RecordEncoder(
-        stream, head or header.encode(record.instance, record.controller, record.versions)
-    )
+    encoder = RecordEncoder(stream, head or header.encode(record.instance, record.controller, record.versions))
     encoder.begin(record.instance)
     for block in record.blocks:
         encoder.frames(block)
@@ -175,9 +173,7 @@ def unlike(path: str, recorded: object, expected: object) -> Difference | None:
         return None
     if isinstance(recorded, list) and isinstance(expected, list):
         rows = zip_longest(cast("list[object]", recorded), cast("list[object]", expected))
-        return next(
-            (difference for k, pair in enumerate(rows) if (difference := unlike(f"{path}[{k}]", *pair))), None
-        )
+        return next((difference for k, pair in enumerate(rows) if (difference := unlike(f"{path}[{k}]", *pair))), None)
     if json.dumps(recorded) == json.dumps(expected):
         return None
     return Difference(path, recorded, expected)

@@ -37,9 +37,7 @@ def contact_mark(instance: Instance, contact: Contact) -> Mark:
     """Return the mark of a contact, which names both and who is at fault."""
     names = instance.names
     other = names[contact.other] if contact.other >= 0 else f"obstacle {-1 - contact.other}"
-    guilty = [
-        name for name, fault in zip((names[contact.car], other), contact.at_fault, strict=True) if fault
-    ]
+    guilty = [name for name, fault in zip((names[contact.car], other), contact.at_fault, strict=True) if fault]
     text = f"{names[contact.car]} touches {other}"
     if guilty:
         text += f" ({' and '.join(guilty)} at fault)"
@@ -92,23 +90,23 @@ def breach_text(violation: Violation) -> str:
 
 def verdict_text(verdict: Verdict) -> str:
     """Return in words why a trial has its verdict: what the ego broke first, and what excused it."""
-    own = next((one for one in verdict.violations if one.car == EGO_NAME), None)
+    first = next((one for one in verdict.violations if one.car == EGO_NAME), None)
     if verdict.verdict is Ruling.UNTOLD:
         known = 100.0 * (verdict.tolerance or 0.0)
         return f"What the ego did can't be told from poses that are known to {known:.1f} cm."
-    if own is None and verdict.cut:
+    if first is None and verdict.cut:
         return "The ego broke nothing until the trial was cut short."
-    if own is None and not verdict.clean:
+    if first is None and not verdict.clean:
         return "The ego broke nothing, but its controller ended the trial."
-    if own is None:
+    if first is None:
         task = "and did its task" if verdict.verdict is Ruling.SATISFIED else "and did not do all of its task"
         return f"The ego broke nothing {task}."
-    breach = f"The ego broke {own.rule} at {own.time:.2f} s"
+    breach = f"The ego broke {first.rule} at {first.time:.2f} s"
     excuse = verdict.excuse
     if excuse is None:
         return f"{breach}, while the others had kept their part."
     fall = excuse.violation
-    when = "at the same instant" if fall.tick == own.tick else f"at {fall.time:.2f} s"
+    when = "at the same instant" if fall.tick == first.tick else f"at {fall.time:.2f} s"
     place = fall.where.intersection
     where = "" if place is None else f" near ({place[0]}, {place[1]})"
     words = RULE_WORDS[fall.rule].deed if fall.rule in RULE_WORDS else "a rule broken"
@@ -124,9 +122,9 @@ def excuse_mark(instance: Instance, verdict: Verdict) -> Mark | None:
 def formula_marks(verdicts: Sequence[FormulaVerdict]) -> list[Mark]:
     """Return the marks of the instants in which verdicts on formulas became definite."""
     return [
-        Mark(found.time, "formula", f"{found.name} is {found.verdict}")
-        for found in verdicts
-        if found.time is not None
+        Mark(verdict.time, "formula", f"{verdict.name} is {verdict.verdict}")
+        for verdict in verdicts
+        if verdict.time is not None
     ]
 
 
@@ -144,9 +142,7 @@ def goal_visits(instance: Instance, frames: Frames) -> list[tuple[int, int]]:
     A visit is an entry of the centre into the goal's disc; being in it in the first frame counts.
     """
     at = frames.at[:, EGO]
-    entry = np.concatenate([[True], at[1:] != at[:-1]])[: len(at)] & np.isin(
-        at, instance.problem.goal_vertices
-    )
+    entry = np.concatenate([[True], at[1:] != at[:-1]])[: len(at)] & np.isin(at, instance.problem.goal_vertices)
     return [(int(frame), int(at[frame])) for frame in np.flatnonzero(entry)]
 
 

@@ -73,19 +73,15 @@ def record_html(record: Record) -> str:
     if len(record.frames) == 0:
         return _page(svg.trial_picture(record.instance), "Record", caption.strip(": "))
     marks = [contact_mark(record.instance, contact) for contact in record.frames.contacts[:MARKS]]
-    own = Paths.of(record.instance, record.frames)
-    picture = svg.trial_picture(record.instance, own.last, own.lines(), marks)
+    paths = Paths.of(record.instance, record.frames)
+    picture = svg.trial_picture(record.instance, paths.last, paths.lines(), marks)
     player = replay_page(record.instance, record.frames, record.ending)
     if len(player) > PLAYED:
         return _page(picture, "Record", caption.strip(": "))
-    return render(
-        "viewer/player.html", player=player, picture=picture, heading="Record", caption=caption.strip(": ")
-    )
+    return render("viewer/player.html", player=player, picture=picture, heading="Record", caption=caption.strip(": "))
 
 
-def trial_html(
-    instance: Instance, score: Score, paths: Sequence[Floats] = (), end: Sequence[Pose] = ()
-) -> str:
+def trial_html(instance: Instance, score: Score, paths: Sequence[Floats] = (), end: Sequence[Pose] = ()) -> str:
     """Return the HTML of a trial that was run: its paths, breaches and contacts, and its score."""
     marks: list[Mark] = []
     if score.verdict is not None:
@@ -99,20 +95,20 @@ def trial_html(
 def sheet_html(heading: str, sheet: ScoreSheet) -> str:
     """Return the HTML of scores: the shares of their verdicts, or ends, and the first trials as a table."""
     found: dict[str, Counter[str]] = {}
-    for own in sheet.trials:
-        found.setdefault(own.controller or "-", Counter())[own.outcome] += 1
+    for trial in sheet.trials:
+        found.setdefault(trial.controller or "-", Counter())[trial.outcome] += 1
     head = ("trial", "controller", "verdict", "end", "rounds", "goals visited", "collisions")
     rows = [
         (
-            str(own.trial),
-            own.controller or "-",
-            "-" if own.verdict is None else own.verdict.verdict.value,
-            (own.end or "cut off").replace("_", " "),
-            str(own.rounds),
-            f"{own.goals_visited:.0%}",
-            str(len(own.collisions)),
+            str(trial.trial),
+            trial.controller or "-",
+            "-" if trial.verdict is None else trial.verdict.verdict.value,
+            (trial.end or "cut off").replace("_", " "),
+            str(trial.rounds),
+            f"{trial.goals_visited:.0%}",
+            str(len(trial.collisions)),
         )
-        for own in sheet.trials[:ROWS]
+        for trial in sheet.trials[:ROWS]
     ]
     return shares_html(heading, sheet.summary, found, head, rows, len(sheet.trials))
 

@@ -279,9 +279,7 @@ def _verdict(instance: Instance, verdict: Verdict, marks: Sequence[Mark]) -> dic
 
 def mark_of(mark: Mark, origin: Floats) -> dict[str, Any]:
     """Return a mark as the script of a page reads it."""
-    point = (
-        None if mark.point is None else [mark.point[0] - float(origin[0]), mark.point[1] - float(origin[1])]
-    )
+    point = None if mark.point is None else [mark.point[0] - float(origin[0]), mark.point[1] - float(origin[1])]
     return {
         "time": mark.time,
         "since": mark.since,

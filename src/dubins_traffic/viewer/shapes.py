@@ -139,9 +139,9 @@ def roads(network: RoadNetwork, car: Car) -> list[Shape]:
     """Return the surfaces of roads with their kerbs, and centre lines."""
     lines, wide = road_lines(network), car.road_width
     kerb = Width(wide, rim=2.0 * KERB, least_rim=2.0 * KERB_PIXELS)
-    found: list[Shape] = [Line(line, palette.KERB_COLOUR, kerb) for line in lines]
-    found += [Line(line, palette.ROAD_COLOUR, Width(wide)) for line in lines]
-    return found
+    shapes: list[Shape] = [Line(line, palette.KERB_COLOUR, kerb) for line in lines]
+    shapes += [Line(line, palette.ROAD_COLOUR, Width(wide)) for line in lines]
+    return shapes
 
 
 def centres(network: RoadNetwork, car: Car) -> list[Shape]:
@@ -191,26 +191,24 @@ def places(network: RoadNetwork, car: Car) -> list[Shape]:
 def goals(problem: Problem, lit: Collection[int] | None = None) -> list[Shape]:
     """Return the discs of goals; with `lit` those of some intersections are lit, and the others are dashed."""
     radius = problem.intersection_radius
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     for vertex in goal_numbers(problem):
         x, y = problem.network.points[vertex].tolist()
         width, opacity, dash = 1.4, 0.22, 0.0
         if lit is not None:
             width, opacity, dash = (3.0, 0.42, 0.0) if vertex in lit else (1.8, 0.16, 5.0)
         colour = palette.GOAL_COLOUR
-        found.append(Circle(x, y, radius, colour, colour, width, opacity, dash, "goal"))
-    return found
+        shapes.append(Circle(x, y, radius, colour, colour, width, opacity, dash, "goal"))
+    return shapes
 
 
 def goal_names(problem: Problem, size: Width, lift: float = 0.0) -> list[Shape]:
     """Return the names of goals, which number them in the order of the problem, `lift` metres above their middles."""
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     for vertex, numbers in goal_numbers(problem).items():
         x, y = problem.network.points[vertex].tolist()
-        found.append(
-            Text(x, y + lift, f"goal {numbers}", palette.GOAL_INK_COLOUR, size, bold=True, number=numbers)
-        )
-    return found
+        shapes.append(Text(x, y + lift, f"goal {numbers}", palette.GOAL_INK_COLOUR, size, bold=True, number=numbers))
+    return shapes
 
 
 def obstacles(problem: Problem) -> list[Shape]:
@@ -226,36 +224,40 @@ def obstacles(problem: Problem) -> list[Shape]:
 
 def cars(body: Body, names: Sequence[str], poses: Sequence[Pose], *, ghost: bool = False) -> list[Shape]:
     """Return bodies with their headings, the ego on top; a `ghost` is an outline, for starts beside ends."""
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     for index, (name, pose) in reversed(list(enumerate(zip(names, poses, strict=True)))):
         colour = palette.car_colour(index)
         fill, edge = ("#ffffff", colour) if ghost else (colour, palette.INK_COLOUR)
-        found.append(Region(outline(body, pose), fill, edge, label=None if ghost else name))
-        found.append(Region(nose(body, pose), edge if ghost else "#ffffff", None))
-    return found
+        shapes.append(Region(outline(body, pose), fill, edge, label=None if ghost else name))
+        shapes.append(Region(nose(body, pose), edge if ghost else "#ffffff", None))
+    return shapes
 
 
 def ways(lines: Sequence[Floats]) -> list[Shape]:
     """Return the ways of cars, the ego's on top and thicker."""
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     for index, line in reversed(list(enumerate(lines))):
         more = 1.35 if index == 0 else 1.0
         width = Width(0.07 * more, 0.7 * more, 2.2 * more)
-        found.append(Line(line, palette.car_colour(index), width, opacity=0.9))
-    return found
+        shapes.append(Line(line, palette.car_colour(index), width, opacity=0.9))
+    return shapes
 
 
 def signs(marks: Sequence[Mark]) -> list[Shape]:
     """Return contacts as crosses, and breaches as triangles, filled if they are the ego's."""
-    found: list[Shape] = []
+    shapes: list[Shape] = []
     for mark in marks:
         if mark.point is None or mark.kind not in ("contact", "breach"):
             continue
-        own = mark.car == 0
-        breach = palette.BREACH_COLOURS[not own]
+        is_ego = mark.car == 0
+        breach = palette.BREACH_COLOURS[not is_ego]
         if mark.kind == "contact":
             looks = (palette.CONTACT_COLOUR, "#ffffff", "contact")
         else:
-            looks = (breach if own else "#ffffff", breach, "breach of the ego" if own else "breach of others")
-        found.append(Sign(*mark.point, mark.kind, *looks))
-    return found
+            looks = (
+                breach if is_ego else "#ffffff",
+                breach,
+                "breach of the ego" if is_ego else "breach of others",
+            )
+        shapes.append(Sign(*mark.point, mark.kind, *looks))
+    return shapes

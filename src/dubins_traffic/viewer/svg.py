@@ -83,9 +83,7 @@ class Drawing:
         if isinstance(shape, Line):
             more = ' stroke-linecap="round"' if shape.round else ""
             if shape.dash is not None:
-                more += ' stroke-dasharray="{:.1f} {:.1f}"'.format(
-                    *(self.scale * part for part in shape.dash)
-                )
+                more += ' stroke-dasharray="{:.1f} {:.1f}"'.format(*(self.scale * part for part in shape.dash))
             if (opacity := shape.opacity_at(self.scale)) < 1.0:
                 more += f' stroke-opacity="{opacity:.2g}"'
             return (
@@ -112,9 +110,7 @@ class Drawing:
     def _sign(self, sign: Sign, x: float, y: float) -> str:
         size = SIGN
         if sign.kind == "contact":
-            ends = (
-                f"M{x - size:.1f} {y - size:.1f}l{2 * size} {2 * size}m0 -{2 * size}l-{2 * size} {2 * size}"
-            )
+            ends = f"M{x - size:.1f} {y - size:.1f}l{2 * size} {2 * size}m0 -{2 * size}l-{2 * size} {2 * size}"
             return f'<path d="{ends}" fill="none" stroke="{sign.fill}" stroke-width="2.2"/>'
         corners = [(x, y - size), (x + 0.9 * size, y + 0.6 * size), (x - 0.9 * size, y + 0.6 * size)]
         points = " ".join(f"{px:.1f},{py:.1f}" for px, py in corners)

@@ -65,9 +65,7 @@ class _Run:
     controllers: Sequence[str]
 
 
-def compare_campaigns(
-    first: str | os.PathLike[str], second: str | os.PathLike[str]
-) -> tuple[list[Across], str]:
+def compare_campaigns(first: str | os.PathLike[str], second: str | os.PathLike[str]) -> tuple[list[Across], str]:
     """Compare each controller of a campaign with that of the same name in another one, or if none is, the best of both.
 
     Trials are paired where configuration, factors, seed and number are the same, and so the instances.
@@ -125,11 +123,11 @@ def table(one: Across, *, everything: bool = False, width: int = WIDTH) -> Itera
     made.add_column("metric", overflow="fold")
     for heading in ("A", "B", "B - A", "95 %"):
         made.add_column(heading, justify="right", no_wrap=True)
-    told = [own for own in one.changes if everything or own.first.mean or own.second.mean]
-    for own in told:
-        cells = (shown(own.first.mean), shown(own.second.mean), f"{own.difference:+.4g}")
-        interval = f"{shown(own.interval[0])} .. {shown(own.interval[1])}"
-        made.add_row(own.metric.heading, *cells, interval, style="bold" if own.is_decided else "")
+    told = [change for change in one.changes if everything or change.first.mean or change.second.mean]
+    for difference in told:
+        cells = (shown(difference.first.mean), shown(difference.second.mean), f"{difference.difference:+.4g}")
+        interval = f"{shown(difference.interval[0])} .. {shown(difference.interval[1])}"
+        made.add_row(difference.metric.heading, *cells, interval, style="bold" if difference.is_decided else "")
     yield made
     left = len(one.changes) - len(told)
     if left:
@@ -148,15 +146,15 @@ def _across(one: _Run, other: _Run, first: str, second: str) -> Across:
     paired = len(rows)
     if not paired:
         rows, others = np.flatnonzero(left), np.flatnonzero(right)
-    found: list[Change] = []
+    changes: list[Change] = []
     for metric in one.metrics:
         if metric not in other.metrics:
             continue
         values = floats(one.results[metric.name])[rows], floats(other.results[metric.name])[others]
         change = _change(metric, *values, paired=bool(paired))
         if change is not None:
-            found.append(change)
-    return Across(first, second, int(left.sum()), int(right.sum()), paired, found)
+            changes.append(change)
+    return Across(first, second, int(left.sum()), int(right.sum()), paired, changes)
 
 
 def _same_instances(one: _Run, other: _Run, left: Ints, right: Ints) -> tuple[Ints, Ints]:

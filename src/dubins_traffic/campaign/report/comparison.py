@@ -174,7 +174,7 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
         int((~np.isnan(fallen)).sum()),
         known,
         [metric for metric in metrics if metric.bounded and metric not in known],
-        [_standing(name, results.filter(_mask(own)), known, values, own) for name, own in chosen.items()],
+        [_standing(name, results.filter(_mask(of_name)), known, values, of_name) for name, of_name in chosen.items()],
         list(_differences(campaign, results, chosen, known, values)),
         list(_differences(campaign, results, chosen, RANKING, merits)),
         list(_levels(results, factors, chosen, known, values)),
@@ -184,7 +184,7 @@ def compare(campaign: Campaign, results: Any, wall: Any = None) -> Comparison:
 
 def metrics_of(campaign: Campaign) -> tuple[Column, ...]:
     """Return the metrics of a campaign's table that are numbers: those of every score, and further ones."""
-    return (*REPORTED, *(own for own in campaign.columns if own.kind != "string"))
+    return (*REPORTED, *(column for column in campaign.columns if column.kind != "string"))
 
 
 def ranked(campaign: Campaign, results: Any) -> list[str]:
@@ -196,8 +196,8 @@ def ranked(campaign: Campaign, results: Any) -> list[str]:
     columns = [np.nan_to_num(floats(results[metric.name])) for metric in RANKING]
 
     def merit(name: str) -> list[float]:
-        own = names == name
-        return [float(column[own].sum()) / max(1, int(own.sum())) for column in columns]
+        is_controller = names == name
+        return [float(column[is_controller].sum()) / max(1, int(is_controller.sum())) for column in columns]
 
     return sorted(campaign.controllers, key=merit, reverse=True)
 
@@ -212,35 +212,35 @@ def _factors(campaign: Campaign) -> dict[str, list[str]]:
 
 
 def _standing(
-    controller: str, own: Any, metrics: Sequence[Column], values: Mapping[str, Floats], chosen: Any
+    controller: str, results: Any, metrics: Sequence[Column], values: Mapping[str, Floats], chosen: Any
 ) -> Standing:
-    ends: list[str] = own["end"].to_pylist()
-    verdicts: list[str | None] = own["verdict"].to_pylist()
+    ends: list[str] = results["end"].to_pylist()
+    verdicts: list[str | None] = results["verdict"].to_pylist()
     judged = sum(verdict is not None for verdict in verdicts)
     seen = [verdict.value for verdict in OF_SIMULATED]
     nothing = sum(ends.count(end) for end in rows.NOTHING)
-    clean: list[bool | None] = own["clean"].to_pylist()
+    clean: list[bool | None] = results["clean"].to_pylist()
     cut = sum(map(was_cut, verdicts, clean, ends))
 
     def happened(column: str) -> Share:
-        return share(int((floats(own[column]) > 0).sum()), judged)
+        return share(int((floats(results[column]) > 0).sum()), judged)
 
     return Standing(
         controller,
-        len(own),
+        len(results),
         judged,
         {metric.name: estimate(values[metric.name][chosen]) for metric in metrics},
         share(clean.count(True), judged - cut + nothing if judged else 0),
         cut,
         share(sum(ends.count(end) for end in BY_CONTROLLER), len(ends)),
-        share(int((floats(own["near"]) > 0).sum()), verdicts.count(Ruling.EXCUSED.value)),
+        share(int((floats(results["near"]) > 0).sum()), verdicts.count(Ruling.EXCUSED.value)),
         {verdict: share(verdicts.count(verdict), judged) for verdict in seen} if judged else {},
         {end: share(ends.count(end), len(ends)) for end in sorted(set(ends))},
         {rule: happened(f"breaches.{rule}") for rule in EGO_RULES} if judged else {},
         {part: happened(f"breaches_of_others.{part}") for part in ASSUMPTIONS} if judged else {},
-        int(np.nansum(floats(own["collisions"]))),
-        {who: int(np.nansum(floats(own[column]))) for column, who in FAULTS.items()},
-        _formulas(own["formulas"].to_pylist()),
+        int(np.nansum(floats(results["collisions"]))),
+        {who: int(np.nansum(floats(results[column]))) for column, who in FAULTS.items()},
+        _formulas(results["formulas"].to_pylist()),
     )
 
 
@@ -251,10 +251,7 @@ def _formulas(column: Sequence[str | None]) -> dict[str, dict[str, Share]]:
         held: dict[str, str] = json.loads(text or "{}")
         for name, verdict in held.items():
             counts.setdefault(name, Counter())[verdict] += times
-    return {
-        name: {verdict: share(found[verdict], found.total()) for verdict in HELD}
-        for name, found in counts.items()
-    }
+    return {name: {verdict: share(count[verdict], count.total()) for verdict in HELD} for name, count in counts.items()}
 
 
 def _is_told(metric: Column, values: Floats) -> bool:
@@ -294,9 +291,9 @@ def _levels(
         texts: Any = np.array([table.factor_text(value) for value in results[name].to_pylist()], dtype=object)
         for level in levels:
             here = texts == level
-            for controller, own in chosen.items():
+            for controller, of_controller in chosen.items():
                 for metric in metrics:
-                    found = estimate(values[metric.name][here & own], median=False)
+                    found = estimate(values[metric.name][here & of_controller], median=False)
                     yield Level(factor, level, controller, metric, found)
 
 
@@ -310,8 +307,8 @@ def floats(column: Any) -> Floats:
     )
 
 
-def _mask(own: Any) -> Any:
-    return rows.arrow().array(own)
+def _mask(flags: Any) -> Any:
+    return rows.arrow().array(flags)
 
 
 def shown(value: float | None) -> str:

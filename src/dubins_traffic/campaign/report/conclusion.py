@@ -56,8 +56,8 @@ def more_than(one: Difference, whom: str) -> str:
 
 def _alone(standing: Standing) -> str:
     metric = RANKING[0]
-    found = standing.estimates.get(metric.name)
-    ends = None if found is None else found.mean_interval
+    estimate = standing.estimates.get(metric.name)
+    ends = None if estimate is None else estimate.mean_interval
     interval = "" if ends is None else f" (95 % interval {shown(ends[0])} to {shown(ends[1])})"
     return f"{standing.controller} has {_mean(standing, metric)} {metric.label} a trial{interval}."
 
@@ -69,9 +69,7 @@ def _best(comparison: Comparison, best: Standing, other: str) -> str:
     count = merits[0].estimate.count
     if count < FEWEST:
         pairs = f"{number_of(count, 'pair')} of trials"
-        return (
-            f"{pairs} can't tell whether {best.controller} or {other} is better; it takes {FEWEST} or more."
-        )
+        return f"{pairs} can't tell whether {best.controller} or {other} is better; it takes {FEWEST} or more."
     rounds, before = RANKING
     for merit in merits:
         if is_told(merit) and merit.better == best.controller:
@@ -94,6 +92,6 @@ def _merits(comparison: Comparison, first: str, second: str) -> list[Difference]
 
 def _mean(standing: Standing, metric: Column) -> str:
     """Return the mean of a column over all trials; one that came to nothing counts 0."""
-    found = standing.estimates.get(metric.name)
-    mean = 0.0 if found is None or found.mean is None else found.mean * found.count
+    estimate = standing.estimates.get(metric.name)
+    mean = 0.0 if estimate is None or estimate.mean is None else estimate.mean * estimate.count
     return shown(mean / max(1, standing.trials))

@@ -30,7 +30,7 @@ def latex_table(comparison: Comparison) -> str:
         r"\toprule",
         _row("controller", *(escaped(metric.heading) for metric in metrics)),
         r"\midrule",
-        *(_row(_name(own), *(_cell(own, metric) for metric in metrics)) for own in comparison.standings),
+        *(_row(_name(standing), *(_cell(standing, metric) for metric in metrics)) for standing in comparison.standings),
         r"\bottomrule",
         r"\end{tabular}",
     ]

@@ -114,14 +114,14 @@ def ranking(comparison: Comparison) -> Chart:
     def draw(axes: Any) -> None:
         for which, metric in enumerate(RANKING):
             for k, standing in enumerate(standings):
-                found = standing.estimates.get(metric.name)
-                if found is None or found.mean is None or found.mean_interval is None:
+                estimate = standing.estimates.get(metric.name)
+                if estimate is None or estimate.mean is None or estimate.mean_interval is None:
                     continue
-                low, high = found.mean_interval
+                low, high = estimate.mean_interval
                 axes.errorbar(
-                    [found.mean],
+                    [estimate.mean],
                     [k + 0.28 * (which - 0.5)],
-                    xerr=[[max(0.0, found.mean - low)], [max(0.0, high - found.mean)]],
+                    xerr=[[max(0.0, estimate.mean - low)], [max(0.0, high - estimate.mean)]],
                     color=colour(k),
                     marker="os"[which],
                     markerfacecolor=colour(k) if which == 0 else "none",
@@ -130,7 +130,7 @@ def ranking(comparison: Comparison) -> Chart:
                     elinewidth=1.4,
                     capsize=3.0,
                 )
-        axes.set_yticks(range(len(standings)), [_short(own.controller) for own in standings])
+        axes.set_yticks(range(len(standings)), [_short(standing.controller) for standing in standings])
         axes.set_ylim(len(standings) - 0.5, -0.5)
         axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
         axes.set_xlabel("a trial, mean with 95 % interval")
@@ -142,9 +142,7 @@ def ranking(comparison: Comparison) -> Chart:
         _legend(axes, len(RANKING))
 
     names = " and ".join(metric.label for metric in RANKING)
-    return Chart(
-        "ranking", f"Mean {names} of each controller", draw, 1.5 + 0.5 * len(standings), is_wide=True
-    )
+    return Chart("ranking", f"Mean {names} of each controller", draw, 1.5 + 0.5 * len(standings), is_wide=True)
 
 
 def against(comparison: Comparison, factor: str, metric: Column) -> Chart:
@@ -157,9 +155,9 @@ def against(comparison: Comparison, factor: str, metric: Column) -> Chart:
     def draw(axes: Any) -> None:
         controllers = comparison.controllers
         for k, controller in enumerate(controllers):
-            own = [level for level in levels if level.controller == controller]
+            shown = [level for level in levels if level.controller == controller]
             shift = DODGE * step * (k - 0.5 * (len(controllers) - 1))
-            _line(axes, [place + shift for place in places], own, k)
+            _line(axes, [place + shift for place in places], shown, k)
         axes.set_xticks(places, values)
         axes.set_xlim(places[0] - 0.5 * step, places[-1] + 0.5 * step)
         if max(len(value) for value in values) * len(values) > 30:
@@ -181,9 +179,7 @@ def verdicts(comparison: Comparison) -> Chart:
         for standing in comparison.standings
         if standing.verdicts
     }
-    return _bars(
-        "verdicts", "Shares of the verdicts", rows, VERDICTS, "share of the judged trials", percent=True
-    )
+    return _bars("verdicts", "Shares of the verdicts", rows, VERDICTS, "share of the judged trials", percent=True)
 
 
 def formula(comparison: Comparison, name: str, number: int) -> Chart:
@@ -205,8 +201,8 @@ def formula(comparison: Comparison, name: str, number: int) -> Chart:
 
 def says_nothing(comparison: Comparison, factor: str, metric: Column) -> bool:
     """Tell whether the plot of a metric against a factor would show nothing: it is 0 or absent everywhere."""
-    own = (level for level in comparison.levels if level.factor == factor and level.metric is metric)
-    return not any(level.estimate.mean for level in own)
+    levels = (level for level in comparison.levels if level.factor == factor and level.metric is metric)
+    return not any(level.estimate.mean for level in levels)
 
 
 def no_faults(comparison: Comparison) -> bool:
@@ -217,14 +213,10 @@ def no_faults(comparison: Comparison) -> bool:
 def faults(comparison: Comparison) -> Chart:
     """Return the collisions per 100 trials by fault as bars."""
     rows = {
-        standing.controller: {
-            name: 100.0 * standing.faults[name] / max(1, standing.trials) for name in FAULTS
-        }
+        standing.controller: {name: 100.0 * standing.faults[name] / max(1, standing.trials) for name in FAULTS}
         for standing in comparison.standings
     }
-    return _bars(
-        "faults", "Collisions by fault", rows, FAULTS, "collisions of the ego in 100 trials", percent=False
-    )
+    return _bars("faults", "Collisions by fault", rows, FAULTS, "collisions of the ego in 100 trials", percent=False)
 
 
 def colour(index: int) -> str:
@@ -318,9 +310,7 @@ def _bars(
             axes.barh(range(len(names)), widths, left=left, color=fill, height=0.6, label=part)
             for k, width in enumerate(widths):
                 if percent and width > (0.08 if axes.figure.get_figwidth() > NARROW else 0.2):
-                    axes.text(
-                        left[k] + 0.5 * width, k, f"{width:.0%}", ha="center", va="center", color="white"
-                    )
+                    axes.text(left[k] + 0.5 * width, k, f"{width:.0%}", ha="center", va="center", color="white")
             left = [start + width for start, width in zip(left, widths, strict=True)]
         axes.set_yticks(range(len(names)), [_short(name) for name in names])
         axes.invert_yaxis()
@@ -352,9 +342,9 @@ def _themed(svg: str) -> str:
     names = {light: f"--c{number}" for number, light in enumerate(DARK)}
     for light, name in names.items():
         svg = re.sub(re.escape(light) + r"\b", f"var({name})", svg, flags=re.IGNORECASE)
-    own = "".join(f"{names[light]}:{light};" for light in DARK)
+    variables = "".join(f"{names[light]}:{light};" for light in DARK)
     other = "".join(f"{names[light]}:{dark};" for light, dark in DARK.items())
-    style = f"<style>:root{{{own}}}@media(prefers-color-scheme:dark){{:root{{{other}}}}}</style>"
+    style = f"<style>:root{{{variables}}}@media(prefers-color-scheme:dark){{:root{{{other}}}}}</style>"
     head, start, rest = svg.partition("<svg")
     tag, close, body = rest.partition(">")
     return f"{head}{start}{tag}{close}\n{style}{body}"

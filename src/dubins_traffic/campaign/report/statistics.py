@@ -96,17 +96,14 @@ def apart(first: Floats, second: Floats) -> tuple[float | None, Interval | None]
         return mean, (mean - half, mean + half)
     draws = np.random.default_rng(SEED)
     resampled = [
-        values[draws.integers(0, len(values), (RESAMPLES, len(values)))].mean(axis=-1)
-        for values in (one, other)
+        values[draws.integers(0, len(values), (RESAMPLES, len(values)))].mean(axis=-1) for values in (one, other)
     ]
     return mean, _between(resampled[1] - resampled[0])
 
 
 def share(count: int, total: int) -> Share:
     """Return a share of trials."""
-    return (
-        Share(count, total, count / total, wilson(count, total)) if total else Share(count, total, None, None)
-    )
+    return Share(count, total, count / total, wilson(count, total)) if total else Share(count, total, None, None)
 
 
 def wilson(count: int, total: int) -> Interval:
@@ -134,9 +131,7 @@ def korn_graubard(values: Sequence[float]) -> Interval:
     mean = math.fsum(values) / len(values)
     if mean <= 0.0 or mean >= 1.0:
         return (0.0, 1.0)
-    student = distributions("an estimate of a probability", "falsify").t.ppf(
-        0.5 + 0.5 * LEVEL, len(values) - 1
-    )
+    student = distributions("an estimate of a probability", "falsify").t.ppf(0.5 + 0.5 * LEVEL, len(values) - 1)
     total = worth(values) * (NORMAL / float(student)) ** 2
     return clopper_pearson(mean * total, total)
 

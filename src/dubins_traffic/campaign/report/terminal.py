@@ -46,10 +46,11 @@ def short_tables(comparison: Comparison, width: int = WIDTH) -> Iterator[str | T
     yield ""
     chosen = _fitting(comparison, short_metrics(comparison), width)
     yield _short_table(comparison, chosen)
-    ended = [own for own in comparison.standings if own.ended.count]
+    ended = [standing for standing in comparison.standings if standing.ended.count]
     if ended:
         each = [
-            f"{own.controller} {own.ended.count} of {own.ended.total}" for own in ended[:MOST_CONTROLLERS]
+            f"{standing.controller} {standing.ended.count} of {standing.ended.total}"
+            for standing in ended[:MOST_CONTROLLERS]
         ]
         rest = f", and {len(ended) - len(each)} more controllers" if len(ended) > len(each) else ""
         yield _wrapped(f"Trials ended by the controller: {', '.join(each)}{rest}.", width)
@@ -69,8 +70,8 @@ def short_metrics(comparison: Comparison) -> list[Column]:
 
 def is_zero(comparison: Comparison, metric: Column) -> bool:
     """Tell whether a metric is 0, or absent, in all trials."""
-    estimates = [own.estimates[metric.name] for own in comparison.standings]
-    return not any(found.mean or (found.mean_interval or (0.0, 0.0)) != (0.0, 0.0) for found in estimates)
+    estimates = [standing.estimates[metric.name] for standing in comparison.standings]
+    return not any(estimate.mean or (estimate.mean_interval or (0.0, 0.0)) != (0.0, 0.0) for estimate in estimates)
 
 
 def short_worst(worst: Mapping[str, Sequence[Bad]], folder: str, width: int = WIDTH) -> Iterator[str]:
@@ -106,15 +107,18 @@ def _short_table(comparison: Comparison, chosen: Sequence[Column]) -> Table:
 def _fitting(comparison: Comparison, metrics: Sequence[Column], width: int) -> list[Column]:
     """Return the first of some metrics, as many as the table has room for."""
     standings = comparison.standings[:MOST_CONTROLLERS]
-    room = width - max(len("controller"), *(len(_fitted(own.controller)) for own in standings)) - 1
-    found: list[Column] = []
+    room = width - max(len("controller"), *(len(_fitted(standing.controller)) for standing in standings)) - 1
+    columns: list[Column] = []
     for metric in metrics:
-        lines = [*_short_heading(metric).split("\n"), *(_short_cell(own, metric) for own in standings)]
+        lines = [
+            *_short_heading(metric).split("\n"),
+            *(_short_cell(standing, metric) for standing in standings),
+        ]
         room -= 2 + max(map(len, lines))
         if room < 0:
             break
-        found.append(metric)
-    return found
+        columns.append(metric)
+    return columns
 
 
 def _short_heading(metric: Column) -> str:
@@ -133,8 +137,8 @@ def short_estimate(standing: Standing, metric: Column) -> tuple[float | None, In
     """Return the mean of a metric and its 95 % interval; of clean trials the share, with Wilson's."""
     if metric.name == "clean":
         return standing.clean.share, standing.clean.interval
-    found = standing.estimates[metric.name]
-    return found.mean, found.mean_interval
+    estimate = standing.estimates[metric.name]
+    return estimate.mean, estimate.mean_interval
 
 
 def _short_cell(standing: Standing, metric: Column) -> str:
@@ -160,9 +164,7 @@ def worst_lines(worst: Mapping[str, Sequence[Bad]], folder: str) -> Iterator[str
     for controller, trials in worst.items():
         for bad in trials:
             row = bad.row
-            place = ", ".join(
-                [row["configuration"], *bad.factors, f"trial {row['trial']} of seed {row['seed']}"]
-            )
+            place = ", ".join([row["configuration"], *bad.factors, f"trial {row['trial']} of seed {row['seed']}"])
             note = f" ({bad.note})" if bad.note else ""
             yield f"{controller}, {place}: {bad.why}{note}"
             yield f"    dubins-traffic campaign replay {shlex.quote(folder)} {row['number']}"
@@ -206,11 +208,9 @@ def _share_table(comparison: Comparison) -> Table:
             table.add_row("cut", standing.controller, str(standing.cut), "", "")
         for who, count in standing.faults.items():
             table.add_row(f"fault of {who}", standing.controller, str(count), "", "")
-        for name, found in standing.formulas.items():
-            for verdict, counted in found.items():
-                table.add_row(
-                    f"{name}: {verdict}", standing.controller, str(counted.count), *_share_cell(counted)
-                )
+        for name, formula in standing.formulas.items():
+            for verdict, counted in formula.items():
+                table.add_row(f"{name}: {verdict}", standing.controller, str(counted.count), *_share_cell(counted))
     return table
 
 
@@ -218,9 +218,7 @@ def _table(title: str) -> Table:
     from rich import box
     from rich.table import Table
 
-    return Table(
-        box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, title=title, title_justify="left"
-    )
+    return Table(box=box.SIMPLE_HEAD, padding=(0, 1, 0, 0), show_edge=False, title=title, title_justify="left")
 
 
 def _columns(table: Table, names: tuple[str, ...], numbers: tuple[str, ...]) -> None:

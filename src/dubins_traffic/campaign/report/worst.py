@@ -56,10 +56,8 @@ class Bad:
     @property
     def factors(self) -> list[str]:
         """What varied, with its values, in words."""
-        own = {
-            name.removeprefix(FACTOR): value for name, value in self.row.items() if name.startswith(FACTOR)
-        }
-        return [f"{words(name)} {value}" for name, value in own.items()]
+        settings = {name.removeprefix(FACTOR): value for name, value in self.row.items() if name.startswith(FACTOR)}
+        return [f"{words(name)} {value}" for name, value in settings.items()]
 
 
 def order(results: Any) -> Ints:
@@ -122,25 +120,22 @@ def worst(
     A trial that came to nothing is not run again. `tell` is told how many of how many replays there are.
     """
     compute: Any = rows.arrow().compute
-    chosen = {
-        name: _first(results.filter(compute.equal(results["controller"], name)), count)
-        for name in controllers
-    }
+    chosen = {name: _first(results.filter(compute.equal(results["controller"], name)), count) for name in controllers}
     total = sum(map(len, chosen.values()))
     (folder / FOLDER).mkdir(parents=True, exist_ok=True)
     found: dict[str, list[Bad]] = {}
     done = 0
-    for name, own in chosen.items():
+    for name, found_rows in chosen.items():
         found[name] = []
-        for row in own:
+        for row in found_rows:
             tell(done, total)
             found[name].append(_bad(campaign, row, folder))
             done += 1
     return found
 
 
-def _first(own: Any, count: int) -> list[Mapping[str, Any]]:
-    return own.take(rows.arrow().array(order(own)[:count])).to_pylist()
+def _first(trials: Any, count: int) -> list[Mapping[str, Any]]:
+    return trials.take(rows.arrow().array(order(trials)[:count])).to_pylist()
 
 
 def _bad(campaign: Campaign, row: Mapping[str, Any], folder: Path) -> Bad:

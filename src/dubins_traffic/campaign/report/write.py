@@ -69,7 +69,7 @@ def page(comparison: Comparison, manifest: Mapping[str, Any], worst: Mapping[str
         by_fault=[f"fault of {who}" for who in plots.FAULTS],
         ended="ended by the controller",
         held=list(plots.FORMULA),
-        formulas={name: [own for own in standings if name in own.formulas] for name in carried},
+        formulas={name: [standing for standing in standings if name in standing.formulas] for name in carried},
         formula_charts=_formula_charts(comparison),
         pairs=list(dict.fromkeys((one.first, one.second) for one in comparison.differences)),
         factors=[_against(comparison, factor) for factor in comparison.factors],
@@ -100,16 +100,16 @@ def charts(comparison: Comparison) -> list[plots.Chart]:
 
 
 def _overview(comparison: Comparison) -> list[plots.Chart]:
-    found: list[plots.Chart] = []
+    charts: list[plots.Chart] = []
     if any(standing.verdicts for standing in comparison.standings):
-        found.append(plots.verdicts(comparison))
+        charts.append(plots.verdicts(comparison))
     if not plots.no_faults(comparison):
-        found.append(plots.faults(comparison))
-    return found
+        charts.append(plots.faults(comparison))
+    return charts
 
 
 def _formulas(comparison: Comparison) -> list[str]:
-    return list(dict.fromkeys(name for own in comparison.standings for name in own.formulas))
+    return list(dict.fromkeys(name for standing in comparison.standings for name in standing.formulas))
 
 
 def _formula_charts(comparison: Comparison) -> list[plots.Chart]:
@@ -127,9 +127,9 @@ def _page_shares(comparison: Comparison) -> list[tuple[str, list[str], list[str]
     """Return tables of shares: heading, what is counted, the same in words, shares by controller, the clauses."""
     standings = comparison.standings
     groups = {
-        "Trials in which the ego broke a rule": [own.broken for own in standings],
-        "Trials in which others broke the assumption": [own.fallen for own in standings],
-        "Ends of all trials": [own.ends for own in standings],
+        "Trials in which the ego broke a rule": [standing.broken for standing in standings],
+        "Trials in which others broke the assumption": [standing.fallen for standing in standings],
+        "Ends of all trials": [standing.ends for standing in standings],
     }
     found: list[tuple[str, list[str], list[str], list[Any], str]] = []
     for title, shares in groups.items():
@@ -152,9 +152,7 @@ def _made(manifest: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _number(value: float | None, signed: bool = False) -> str:
-    return (
-        f"+{shown(value)}" if signed and value is not None and value > 0 else shown(value).replace("-", MINUS)
-    )
+    return f"+{shown(value)}" if signed and value is not None and value > 0 else shown(value).replace("-", MINUS)
 
 
 ESTIMATE = ("count", "mean", "mean_low", "mean_high", "median", "median_low", "median_high")
@@ -292,9 +290,7 @@ def open_campaign(folder: str | os.PathLike[str]) -> tuple[Path, Mapping[str, An
     place = Path(folder)
     known = manifest.read(place)
     if known is None:
-        raise InputError(
-            "no campaign", file=str(place), expected="the folder of a campaign, with manifest.json"
-        )
+        raise InputError("no campaign", file=str(place), expected="the folder of a campaign, with manifest.json")
     campaign = manifest.stored_campaign(place, known)
     found = table.read(place, campaign, [path for _, _, path in folders.parts(place)])
     if not len(found):
@@ -315,9 +311,7 @@ def csv_files(comparison: Comparison) -> dict[str, str]:
             ("first", "second", "metric", *ESTIMATE, "first_larger", "first_smaller"),
             _differences(comparison),
         ),
-        "factors.csv": _csv_text(
-            ("factor", "value", "controller", "metric", *ESTIMATE[:4]), _factors(comparison)
-        ),
+        "factors.csv": _csv_text(("factor", "value", "controller", "metric", *ESTIMATE[:4]), _factors(comparison)),
     }
 
 
@@ -337,7 +331,7 @@ def _shares(comparison: Comparison) -> Iterator[Sequence[object]]:
             "end": standing.ends,
             "rule broken by the ego": standing.broken,
             "assumption broken by others": standing.fallen,
-            **{f"formula {name}": found for name, found in standing.formulas.items()},
+            **{f"formula {name}": formula for name, formula in standing.formulas.items()},
         }
         for what, group in groups.items():
             for which, part in group.items():

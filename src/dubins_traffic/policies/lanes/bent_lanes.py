@@ -22,19 +22,19 @@ def lane_pieces(network: RoadNetwork, lane: int, w: float) -> list[LanePiece]:
     `w` is half the width of a lane, metres. On an arc that turns left the right lane is longer than the road.
     """
     chains, s, back = network.chains, lane >> 1, bool(lane & 1)
-    own = range(int(chains.first[s]), int(chains.first[s + 1]))
-    found: list[LanePiece] = []
+    numbers = range(int(chains.first[s]), int(chains.first[s + 1]))
+    pieces: list[LanePiece] = []
     done = 0.0
-    for k in reversed(own) if back else own:
+    for k in reversed(numbers) if back else numbers:
         place, way = (chains.end, -chains.end_tangent) if back else (chains.start, chains.tangent)
         (x, y), (c, sine) = place[k].tolist(), way[k].tolist()
         length, side, radius = (float(array[k]) for array in (chains.length, chains.side, chains.radius))
         bend = (-side if back else side) / radius if side else 0.0
         stretch = 1.0 + bend * w
         piece = Piece(x + w * sine, y - w * c, c, sine, length * stretch, bend / stretch)
-        found.append(LanePiece(done, done + length, piece))
+        pieces.append(LanePiece(done, done + length, piece))
         done += length
-    return found
+    return pieces
 
 
 def cut(pieces: list[LanePiece], begin: float, end: float) -> list[LanePiece]:
@@ -57,9 +57,9 @@ def _parts(whole: LanePiece, low: float, high: float) -> list[LanePiece]:
     stretch = piece.length / (whole.end - whole.begin)
     count = int(abs(piece.bend) * stretch * (high - low) / PIECE_ANGLE) + 1
     step = (high - low) / count
-    found: list[LanePiece] = []
+    pieces: list[LanePiece] = []
     for k in range(count):
         first = low + k * step
         x, y, c, s = advanced(piece, stretch * (first - whole.begin))
-        found.append(LanePiece(first, first + step, Piece(x, y, c, s, stretch * step, piece.bend)))
-    return found
+        pieces.append(LanePiece(first, first + step, Piece(x, y, c, s, stretch * step, piece.bend)))
+    return pieces

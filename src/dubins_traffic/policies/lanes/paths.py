@@ -84,9 +84,7 @@ class PathMaker:
         self._visited = frozenset(problem.goal_vertices)
         self._lengths: list[float] = problem.network.lengths.tolist()
         begins, ends = problem.network.tangents.tolist(), problem.network.end_tangents.tolist()
-        self._begins = [
-            way for (tx, ty), (ux, uy) in zip(begins, ends, strict=True) for way in ((tx, ty), (-ux, -uy))
-        ]
+        self._begins = [way for (tx, ty), (ux, uy) in zip(begins, ends, strict=True) for way in ((tx, ty), (-ux, -uy))]
         self._ends = [(-tx, -ty) for k in range(len(self._begins)) for tx, ty in (self._begins[k ^ 1],)]
         self._bent = {
             lane: lane_pieces(problem.network, lane, problem.car.w)
@@ -118,8 +116,8 @@ class PathMaker:
         """Return the length of a lane; of one that bends, twice that of its straight first or last line."""
         if lane not in self._bent:
             return self._lengths[lane >> 1]
-        own = self._bent[lane][end]
-        return 2.0 * STRAIGHT_SHARE * (own.end - own.begin)
+        bent = self._bent[lane][end]
+        return 2.0 * STRAIGHT_SHARE * (bent.end - bent.begin)
 
     def turn_cost(self, lane: int, other: int) -> float:
         """Return what a turn adds to the length of a route, metres."""
@@ -144,7 +142,7 @@ class PathMaker:
         path = table(PathRow, len(rows))
         for name in dict.fromkeys(chain.from_iterable(rows)):
             usual = path[name].tolist()
-            path[name] = [values.get(name, own) for values, own in zip(rows, usual, strict=True)]
+            path[name] = [values.get(name, value) for values, value in zip(rows, usual, strict=True)]
         self._bound(path)
         return Path(path, loop_row)
 
@@ -164,9 +162,7 @@ class PathMaker:
                 "length": piece.length,
                 "lane": lane,
             }
-            rows.append(
-                row | {"bend": piece.bend, "low": -w + EDGE * w, "high": 3.0 * w - EDGE * w, "pivot": 0}
-            )
+            rows.append(row | {"bend": piece.bend, "low": -w + EDGE * w, "high": 3.0 * w - EDGE * w, "pivot": 0})
             begin = low
         sharp = bool(turn.pieces[0].pivot) if turn.pieces else turn.cost != 0.0
         rows[-1]["pivot"] = int(sharp)
@@ -230,17 +226,17 @@ class PathMaker:
                 points[i, k, :, 0] = x - offsets * ty
                 points[i, k, :, 1] = y + offsets * tx
         free = np.min(self._network.on_road(points, (2.0 - EDGE) * w).astype(np.int64), axis=1).tolist()
-        found: list[Bounds] = []
-        for own, piece in zip(free, pieces, strict=True):
+        bounds: list[Bounds] = []
+        for is_free, piece in zip(free, pieces, strict=True):
             right = left = 30
-            while right > 0 and own[right - 1]:
+            while right > 0 and is_free[right - 1]:
                 right -= 1
-            while left < 60 and own[left + 1]:
+            while left < 60 and is_free[left + 1]:
                 left += 1
             low, high = float(offsets[right]), float(offsets[left])
             if piece.bend != 0.0:
                 inner = max(0.0, 1.0 / abs(piece.bend) - w)
                 low = max(low, -inner) if piece.bend < 0.0 else low
                 high = min(high, inner) if piece.bend > 0.0 else high
-            found.append((low, high))
-        return found
+            bounds.append((low, high))
+        return bounds

@@ -13,8 +13,8 @@ from dubins_traffic.policies.safety import body_at
 def gap_from(known: Knowledge, x: float, y: float, n: int) -> float:
     """Return the gap, metres, between car n and the ego if its centre were at (x, y)."""
     ego, vehicle = known.follower, known.vehicle
-    own = body_at(Pose(x, y, ego.c, ego.s), vehicle)
-    return gap_between(own, body_at(pose_of(known.other[n]), vehicle))
+    body = body_at(Pose(x, y, ego.c, ego.s), vehicle)
+    return gap_between(body, body_at(pose_of(known.other[n]), vehicle))
 
 
 @jit
@@ -92,9 +92,7 @@ def _backs_up(known: Knowledge, cause: int) -> bool:
     begins = ego.backs_from < 0 and ego.is_barred == 0
     if begins and far2 < manner.near * manner.near and ego.waited > 0.6 and known.still[cause] > 0.5:
         ego.backs_from = cause
-    if ego.backs_from >= 0 and (
-        car.tick != ego.tick or far2 > manner.clear * manner.clear or not _free_behind(known)
-    ):
+    if ego.backs_from >= 0 and (car.tick != ego.tick or far2 > manner.clear * manner.clear or not _free_behind(known)):
         ego.backs_from = -1
         ego.is_barred = 1
     return ego.backs_from >= 0
@@ -156,9 +154,7 @@ def _passed(known: Knowledge, way: Manoeuvre, last: int) -> int:
     manner = known.manner
     for end in range(8, last - 8, 5):
         tried = Manoeuvre(way.begin, way.aim, way.ramp, manner.spacing * end)
-        first, _, _ = first_conflict(
-            known, min(last, end + 12), 0.0, tried, manner.passing_margin, manner.wary_margin
-        )
+        first, _, _ = first_conflict(known, min(last, end + 12), 0.0, tried, manner.passing_margin, manner.wary_margin)
         if first < 0:
             return end
         if first <= end - 8:

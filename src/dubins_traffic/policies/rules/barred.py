@@ -34,20 +34,20 @@ def is_barred(traffic: Traffic, net: int, lane: int, first: int, last: int, vehi
         done = end + 1e-6
         if begin < nearest_bar(vehicle):
             return True
-        own = begin - vehicle.reach - SLIP
+        furthest = begin - vehicle.reach - SLIP
         until = end + SLIP + 2.0 * vehicle.half_length
         back = length + back_at(until - length, tight, vehicle)
         offset += BERTH + wide
         aside = offset > 3.0 * vehicle.middle - EDGE
-        if aside or back > length + stop_line(vehicle) or own < vehicle.disc + vehicle.reach + EDGE:
+        if aside or back > length + stop_line(vehicle) or furthest < vehicle.disc + vehicle.reach + EDGE:
             return True
-        if passing_time(own, until, tight, vehicle) > vehicle.left_time:
+        if passing_time(furthest, until, tight, vehicle) > vehicle.left_time:
             return True
         for p in range(first, last):
             along, left = lane_coordinates(roads, net, lane, obstacles.parts[p].x, obstacles.parts[p].y)
             far = vehicle.reach + obstacles.parts[p].reach
             beside = abs(left + vehicle.middle - offset) < wide + BESIDE + obstacles.parts[p].reach
-            if own - far < along < back + far and left + vehicle.middle > 0.0 and beside:
+            if furthest - far < along < back + far and left + vehicle.middle > 0.0 and beside:
                 return True
     return False
 

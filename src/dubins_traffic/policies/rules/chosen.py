@@ -37,16 +37,16 @@ def choose(b: int, n: int, barred: float, traffic: Traffic) -> None:
     car.speed, car.pause, car.line_hold, car.keeps = car.usual_speed, 0.0, 0.0, 0.0
     if car.leg >= car.choices:
         return
-    own = drivers.choice[car.choice + car.leg]
-    car.speed = _chosen(own.speed, car.usual_speed)
-    car.pause = _chosen(own.pause, 0.0)
-    car.pause_at = _chosen(own.pause_at, HALF_WAY)
-    car.line_hold = _chosen(own.hold, 0.0)
-    car.hold = _chosen(own.dwell, car.hold)
-    car.keeps = _chosen(own.gap, 0.0)
+    choice = drivers.choice[car.choice + car.leg]
+    car.speed = _chosen(choice.speed, car.usual_speed)
+    car.pause = _chosen(choice.pause, 0.0)
+    car.pause_at = _chosen(choice.pause_at, HALF_WAY)
+    car.line_hold = _chosen(choice.hold, 0.0)
+    car.hold = _chosen(choice.dwell, car.hold)
+    car.keeps = _chosen(choice.gap, 0.0)
     place = int(roads.vert_off[drivers.net[b]]) + lane_end(roads, drivers.net[b], car.lane)
     degree = int(roads.degree[place])
-    wish = int(_chosen(own.exit, -1.0))
+    wish = int(_chosen(choice.exit, -1.0))
     if wish < 0 or degree < drivers.vehicle[b].degree or degree < 3:
         return
     for k in range(degree):

@@ -96,15 +96,11 @@ def _check_valid_stretches(block: KeptCommands, last: int, limit: float, period:
         inside = (low[k] < along) & (along < high[k]) & (past < past_most[k]) & (left <= astray[k])
         held = 1.0 if along <= minds[k] else IF_NOT_BEHIND_EGO
         holds[k] = held if inside else 0.0
-        now[k], yaw_rates[k] = steer(
-            c[k], s[k], left, px, py, bend, speeds[k], SLANT, ALIGNED, limit, 0.0, period
-        )
+        now[k], yaw_rates[k] = steer(c[k], s[k], left, px, py, bend, speeds[k], SLANT, ALIGNED, limit, 0.0, period)
 
 
 @jit_look
-def repeat_command(
-    b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, commands: Floats
-) -> bool:
+def repeat_command(b: int, n: int, tick: int, kind: int, company: int, traffic: Traffic, commands: Floats) -> bool:
     """Write the cached command of a car if it is still valid; tell whether it is. Called after `check_command_caches`.
 
     Whether another car matters to it is looked up here unless `company` says that none does.
@@ -118,11 +114,7 @@ def repeat_command(
     row = drivers.way[b, n]
     changed = labels.lane[b, n] != row.coast_lane or labels.crosses[b, n] != row.coast_crosses
     bits = np.int64(labels.bits[b, n])
-    if (
-        changed
-        or bits & (FLAG.STOPPED | FLAG.BLOCKED | FLAG.LEFT) != row.coast_stopped
-        or bits & GOES_NOW == GOES_NOW
-    ):
+    if changed or bits & (FLAG.STOPPED | FLAG.BLOCKED | FLAG.LEFT) != row.coast_stopped or bits & GOES_NOW == GOES_NOW:
         return False
     x, y = state.x[b, n], state.y[b, n]
     if kind == KIND.ROUND and not keeps_to_road(b, n, x, y, kept_way(row), traffic.roads, drivers):
@@ -144,9 +136,7 @@ def repeat_command(
 
 
 @jit_inline
-def still_meets_nobody(
-    b: int, n: int, bend: float, x: float, y: float, way: ReferencePath, traffic: Traffic
-) -> bool:
+def still_meets_nobody(b: int, n: int, bend: float, x: float, y: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Do as `meets_nobody`, for a car on its lane, or in its arc if its line has a `bend` (1/m)."""
     if bend == 0.0:
         part, key, left, _, _ = on_lane(way, x, y)
@@ -268,9 +258,7 @@ def cruise(hurries: bool, in_disc: bool, vehicle: Vehicle, car: Driver) -> float
 
 
 @jit_inline
-def keeps_to_road(
-    b: int, n: int, x: float, y: float, way: ReferencePath, roads: RoadTable, drivers: Drivers
-) -> bool:
+def keeps_to_road(b: int, n: int, x: float, y: float, way: ReferencePath, roads: RoadTable, drivers: Drivers) -> bool:
     """Tell whether a car is certain to keep VERGE from the edge of the road for a tick, whatever it does.
 
     It is so near to the lane it is on, to the next one, or to the intersection between, that it can't get so far from

@@ -59,11 +59,7 @@ def take_lane(b: int, n: int, tick: int, lane: int, traffic: Traffic) -> None:
         violations |= VIOLATION.TAILGATING
     if car.blocks > 0.0 and uniform(seed, trial, n, tick, DRAW.RULES + 7) < car.blocks:
         car.hold = BLOCK_TIME
-    if (
-        car.parks > 0.0
-        and is_goal(v, car, drivers)
-        and uniform(seed, trial, n, tick, DRAW.RULES + 8) < car.parks
-    ):
+    if car.parks > 0.0 and is_goal(v, car, drivers) and uniform(seed, trial, n, tick, DRAW.RULES + 8) < car.parks:
         car.hold = car.park_time * uniform(seed, trial, n, tick, DRAW.RULES + 9)
     car.violations = violations
     price_exits(b, n, tick, traffic)

@@ -49,9 +49,7 @@ def offset_in_lane(
         return 0.0
     along, left = lane_coordinates(roads, net, lane, 0.0, 0.0)
     tx, ty = lane_direction(roads, net, lane)
-    return clear_offset(
-        along, left + vehicle.middle, float(tx), float(ty), begin, end, obstacles, first, last, vehicle
-    )
+    return clear_offset(along, left + vehicle.middle, float(tx), float(ty), begin, end, obstacles, first, last, vehicle)
 
 
 @jit
@@ -78,9 +76,7 @@ def clear_offset(
             for side in range(2):
                 offset = its - part.reach - wide if side == 0 else its + part.reach + wide
                 near = abs(offset) < abs(best) and low <= offset <= high
-                if near and is_clear(
-                    along, left, tx, ty, begin, end, offset, wide, obstacles, first, last, vehicle
-                ):
+                if near and is_clear(along, left, tx, ty, begin, end, offset, wide, obstacles, first, last, vehicle):
                     best = offset
         if best != INFINITE:
             return min(best, -TINY) if best < 0.0 else max(best, TINY)

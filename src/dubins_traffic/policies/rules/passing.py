@@ -65,9 +65,7 @@ def stop_line(vehicle: Vehicle) -> float:
 @jit
 def can_come_back(vehicle: Vehicle) -> bool:
     """Tell whether a car that has begun to pull out can still stay in its lane: it turns in place, or backs up."""
-    return vehicle.tightest == 0.0 or (
-        vehicle.slowest < 0.0 and turns_within_road(vehicle.tightest, vehicle.middle)
-    )
+    return vehicle.tightest == 0.0 or (vehicle.slowest < 0.0 and turns_within_road(vehicle.tightest, vehicle.middle))
 
 
 @jit_inline
@@ -99,14 +97,14 @@ def back_at(until: float, tight: float, vehicle: Vehicle) -> float:
 
 
 @jit_inline
-def passing_time(own: float, until: float, tight: float, vehicle: Vehicle) -> float:
-    """Return how long passing takes at most, seconds, from `own` (m) along the lane to where `until` (m) it returns.
+def passing_time(here: float, until: float, tight: float, vehicle: Vehicle) -> float:
+    """Return how long passing takes at most, seconds, from `here` (m) along the lane to where `until` (m) it returns.
 
     `tight` (ratio) is `Scratch.tight`.
     """
     if tight == 0.0:
-        return (until + BACK - own) / (0.8 * vehicle.fastest) + TURNING
-    return ((until - own) * slowed_by(tight) + BACK) / (0.8 * vehicle.fastest) + TURNING
+        return (until + BACK - here) / (0.8 * vehicle.fastest) + TURNING
+    return ((until - here) * slowed_by(tight) + BACK) / (0.8 * vehicle.fastest) + TURNING
 
 
 @jit_rare
@@ -118,28 +116,28 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
     reach = vehicle.reach
-    own = along(way, state.x[b, n], state.y[b, n])
-    end, offset, _ = extent(b, n, way, own, traffic, vehicle, drivers.car[b, n].lane)
+    here = along(way, state.x[b, n], state.y[b, n])
+    end, offset, _ = extent(b, n, way, here, traffic, vehicle, drivers.car[b, n].lane)
     width = vehicle.half_width + vehicle.rounding
     offset += BERTH + width
     line = stop_line(vehicle)
     until = end + SLIP + 2.0 * vehicle.half_length
     tight = scratch.tight[0]
     back = back_at(until, tight, vehicle)
-    if end < own or offset > 3.0 * vehicle.middle - EDGE or back > line or not can_come_back(vehicle):
+    if end < here or offset > 3.0 * vehicle.middle - EDGE or back > line or not can_come_back(vehicle):
         return
     net = drivers.net[b]
     length = roads.segment[int(roads.seg_off[net]) + (drivers.car[b, n].lane >> 1)].length
-    if length + own < vehicle.disc + reach + EDGE:
+    if length + here < vehicle.disc + reach + EDGE:
         return
     if labels.bits[b, n] & FLAG.BLOCKED == 0 and not within_lane(offset, vehicle):
         return
-    if stands_beside(b, own, back, offset, way, obstacles, vehicle):
+    if stands_beside(b, here, back, offset, way, obstacles, vehicle):
         return
     crosses_over = n != EGO and not within_lane(offset, vehicle)
-    if crosses_over and ego_is_beside(b, own, back, way, traffic, car.lane, vehicle):
+    if crosses_over and ego_is_beside(b, here, back, way, traffic, car.lane, vehicle):
         return
-    time = passing_time(own, until, tight, vehicle)
+    time = passing_time(here, until, tight, vehicle)
     if time > vehicle.left_time:
         return
     comes = max(COMES, vehicle.fastest) * time * ((1.0 + tight) / (1.0 - tight)) + SPARE
@@ -149,10 +147,10 @@ def find_way_past(b: int, n: int, way: ReferencePath, who: int, traffic: Traffic
         key = along(way, float(state.x[b, j]), float(state.y[b, j]))
         left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
         # An ego that stands may set off and bar the way back, which excuses nobody for long (E5).
-        stands = labels.bits[b, j] & FLAG.STANDS != 0 and (n == EGO or j != EGO or key <= own)
+        stands = labels.bits[b, j] & FLAG.STANDS != 0 and (n == EGO or j != EGO or key <= here)
         passes = labels.bits[b, j] & FLAG.LEFT != 0 and not stands
-        if j != n and key > own - (OVERTAKEN if passes else 0.5):
-            before = key > own or left > vehicle.middle
+        if j != n and key > here - (OVERTAKEN if passes else 0.5):
+            before = key > here or left > vehicle.middle
             wide = half_across(b, j, way.tx, way.ty, state, vehicle) + width + 0.1
             # Before an obstacle all go first in the other lane who are not blocked: who stands may come nearer.
             bars = (who < -1 and left > vehicle.middle) or abs(left - offset) < wide
@@ -181,16 +179,16 @@ def keep_off(b: int, n: int, p: int, way: ReferencePath, traffic: Traffic) -> No
     """
     state, obstacles, drivers = traffic.state, traffic.obstacles, traffic.drivers
     vehicle = drivers.vehicle[b]
-    own = along(way, state.x[b, n], state.y[b, n])
-    end, _, low = extent(b, n, way, own, traffic, vehicle, drivers.car[b, n].lane)
+    here = along(way, state.x[b, n], state.y[b, n])
+    end, _, low = extent(b, n, way, here, traffic, vehicle, drivers.car[b, n].lane)
     offset = 0.0
-    if end >= own and low > -INFINITE:
-        offset = offset_on_way(b, way, own, end + SLIP, obstacles, vehicle)
+    if end >= here and low > -INFINITE:
+        offset = offset_on_way(b, way, here, end + SLIP, obstacles, vehicle)
     if offset == 0.0:
         part = obstacles.parts[p]
         end = along(way, part.x, part.y) + part.reach - vehicle.reach
-        offset = offset_on_way(b, way, own + vehicle.reach, end, obstacles, vehicle)
-    if end + 2.0 * vehicle.reach >= own and offset != 0.0:
+        offset = offset_on_way(b, way, here + vehicle.reach, end, obstacles, vehicle)
+    if end + 2.0 * vehicle.reach >= here and offset != 0.0:
         drivers.car[b, n].aside = offset
         drivers.car[b, n].until = end + SLIP + 2.0 * vehicle.half_length
 
@@ -229,7 +227,7 @@ def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic
 
 @jit_inline
 def ego_is_beside(
-    b: int, own: float, back: float, way: ReferencePath, traffic: Traffic, lane: int, vehicle: Vehicle
+    b: int, here: float, back: float, way: ReferencePath, traffic: Traffic, lane: int, vehicle: Vehicle
 ) -> bool:
     """Tell whether the ego is in the lane where car n would pass: it might stay beside n, or stop where n returns.
 
@@ -243,16 +241,14 @@ def ego_is_beside(
     left = aside(way, state.x[b, EGO], state.y[b, EGO])
     bits = np.int64(labels.bits[b, EGO])
     behind = labels.lane[b, EGO] == lane or labels.lane[b, EGO] < 0
-    if key < own and behind and bits & (FLAG.STANDS | FLAG.LEFT) == FLAG.STANDS:
+    if key < here and behind and bits & (FLAG.STANDS | FLAG.LEFT) == FLAG.STANDS:
         return False
-    return (
-        left < vehicle.middle and own - FOLLOWED < key < back + vehicle.backs_up + 2.0 * vehicle.reach + BERTH
-    )
+    return left < vehicle.middle and here - FOLLOWED < key < back + vehicle.backs_up + 2.0 * vehicle.reach + BERTH
 
 
 @jit
 def extent(
-    b: int, n: int, way: ReferencePath, own: float, traffic: Traffic, vehicle: Vehicle, lane: int
+    b: int, n: int, way: ReferencePath, here: float, traffic: Traffic, vehicle: Vehicle, lane: int
 ) -> tuple[float, float, float]:
     """Return (end, left, right): where what stands ahead in the lane ends, and from where to where it reaches.
 
@@ -260,7 +256,7 @@ def extent(
     as wider: so much that a gap of `BERTH` beside it is safe whatever it does in a tick, however it turns meanwhile.
     """
     state, labels, obstacles, scratch = traffic.state, traffic.labels, traffic.obstacles, traffic.scratch
-    end = own - 1.0
+    end = here - 1.0
     offset = -1.0
     low = INFINITE
     reach = vehicle.reach
@@ -268,17 +264,12 @@ def extent(
     before = end - 1.0
     while end > before:
         before = end
-        horizon = max(own, end) + NARROWS
+        horizon = max(here, end) + NARROWS
         j = scratch.head[lane >> 1]
         while j >= 0:
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
             left = aside(way, float(state.x[b, j]), float(state.y[b, j]))
-            if (
-                j != n
-                and labels.bits[b, j] & FLAG.STANDS != 0
-                and own < key <= horizon
-                and left < vehicle.middle
-            ):
+            if j != n and labels.bits[b, j] & FLAG.STANDS != 0 and here < key <= horizon and left < vehicle.middle:
                 end = max(end, key)
                 half = reach if wider > 0.0 else half_across(b, j, way.tx, way.ty, state, vehicle)
                 offset = max(offset, left + half + wider)
@@ -288,7 +279,7 @@ def extent(
             part = obstacles.parts[p]
             key = along(way, part.x, part.y)
             left = aside(way, part.x, part.y)
-            if own < key <= horizon + part.reach and abs(left) - part.reach < vehicle.middle:
+            if here < key <= horizon + part.reach and abs(left) - part.reach < vehicle.middle:
                 end = max(end, key + part.reach - reach)
                 offset = max(offset, left + part.reach)
                 low = min(low, left - part.reach)
@@ -297,7 +288,7 @@ def extent(
 
 @jit
 def stands_beside(
-    b: int, own: float, back: float, offset: float, way: ReferencePath, obstacles: ObstacleTable, vehicle: Vehicle
+    b: int, here: float, back: float, offset: float, way: ReferencePath, obstacles: ObstacleTable, vehicle: Vehicle
 ) -> bool:  # fmt: skip
     """Tell whether an obstacle is in the way of a car that drives `offset` left of the middle of its lane to `back`."""
     wide = vehicle.half_width + vehicle.rounding + BESIDE
@@ -305,7 +296,7 @@ def stands_beside(
         part = obstacles.parts[p]
         key = along(way, part.x, part.y)
         left = aside(way, part.x, part.y)
-        near = own - vehicle.reach - part.reach < key < back + vehicle.reach + part.reach
+        near = here - vehicle.reach - part.reach < key < back + vehicle.reach + part.reach
         if near and left > 0.0 and abs(left - offset) < wide + part.reach:
             return True
     return False

@@ -164,12 +164,7 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     if not (free and not chooses and drivers.way[b, n].crossing != 0):
         near = gather(b, n, car.lane, x, y, way, traffic)
     gap, who, close = look_ahead(b, n, part, key, left, x, y, way, near, traffic)
-    rides = (
-        car.violations & VIOLATION.TAILGATING != 0
-        and outside
-        and who >= 0
-        and labels.lane[b, who] == car.lane
-    )
+    rides = car.violations & VIOLATION.TAILGATING != 0 and outside and who >= 0 and labels.lane[b, who] == car.lane
     speed = cruise(rides or car.aside != 0.0, labels.crosses[b, n] >= 0, vehicle, car)
     speed = yield_at_line(b, n, tick, speed, part, left, x, y, way, near, traffic)
     kept = 0.0
@@ -283,9 +278,7 @@ def waited_long(car: Driver, bits: Any, vehicle: Vehicle) -> bool:
 
 
 @jit_inline
-def keep_place(
-    b: int, n: int, tick: int, x: float, y: float, c: float, s: float, traffic: Traffic
-) -> ReferencePath:
+def keep_place(b: int, n: int, tick: int, x: float, y: float, c: float, s: float, traffic: Traffic) -> ReferencePath:
     """Update `Driver.lane` and `Driver.next_lane` to where the car is; return its way."""
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
     net = drivers.net[b]

@@ -33,13 +33,13 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
     )  # fmt: skip
     vehicle = drivers.vehicle[b]
     car = drivers.car[b, n]
-    own = along(way, state.x[b, n], state.y[b, n])
+    here = along(way, state.x[b, n], state.y[b, n])
     left = aside(way, state.x[b, n], state.y[b, n])
-    if own >= car.until:
+    if here >= car.until:
         if abs(left) < 0.05:
             car.aside = 0.0
         elif labels.bits[b, n] & FLAG.LEFT != 0:
-            pass_again(b, own, way, near, traffic, car, vehicle)
+            pass_again(b, here, way, near, traffic, car, vehicle)
         return speed
     if labels.bits[b, n] & (FLAG.OVERTAKING | FLAG.LEFT) == 0 and not within_lane(car.aside, vehicle):
         car.aside = 0.0
@@ -48,10 +48,7 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         part = obstacles.parts[p]
         key = along(way, part.x, part.y)
-        if (
-            own - part.reach - length < key <= car.until + part.reach
-            and abs(aside(way, part.x, part.y)) < 2.0
-        ):
+        if here - part.reach - length < key <= car.until + part.reach and abs(aside(way, part.x, part.y)) < 2.0:
             return speed
     beside = False
     before = False
@@ -63,17 +60,17 @@ def keep_passing(b: int, n: int, speed: float, way: ReferencePath, near: int, tr
             continue
         waits = labels.bits[b, j] & FLAG.STANDS != 0
         stands = waits or abs(state.speed[b, j]) < SLOW
-        if stands and own - length < key <= car.until:
+        if stands and here - length < key <= car.until:
             return speed
-        if stands and abs(key - own) < (length + BERTH if waits else length):
+        if stands and abs(key - here) < (length + BERTH if waits else length):
             if goes_farther(key, vehicle, car):
                 return speed
             if waits:
                 car.until = -INFINITE  # It returns behind that one, which may wait for it.
                 return speed
-        if abs(key - own) < length + BERTH:
+        if abs(key - here) < length + BERTH:
             beside = True
-            before = before or key >= own - 0.1
+            before = before or key >= here - 0.1
     if not beside:
         car.aside = 0.0
         return speed
@@ -95,11 +92,11 @@ def goes_farther(key: float, vehicle: Vehicle, car: Driver) -> bool:
 
 @jit
 def pass_again(
-    b: int, own: float, way: ReferencePath, near: int, traffic: Traffic, car: Driver, vehicle: Vehicle
+    b: int, here: float, way: ReferencePath, near: int, traffic: Traffic, car: Driver, vehicle: Vehicle
 ) -> None:
     """Go on passing what has moved up meanwhile and stands where the car would return, if there is room.
 
-    The car is at `own` (m) along the lane; `near` (count) cars are listed.
+    The car is at `here` (m) along the lane; `near` (count) cars are listed.
     """
     state, scratch = traffic.state, traffic.scratch
     length = 2.0 * vehicle.reach + BERTH
@@ -107,6 +104,6 @@ def pass_again(
         j = scratch.near[k]
         key = along(way, state.x[b, j], state.y[b, j])
         until = key + SLIP + 2.0 * vehicle.half_length
-        beside = abs(aside(way, state.x[b, j], state.y[b, j])) < vehicle.middle and 0.0 < key - own < length
+        beside = abs(aside(way, state.x[b, j], state.y[b, j])) < vehicle.middle and 0.0 < key - here < length
         if beside and abs(state.speed[b, j]) < SLOW and until + BACK <= stop_line(vehicle):
             car.until = until

@@ -79,9 +79,7 @@ def yield_at_line(
 
 
 @jit_rare
-def may_enter_bend(
-    b: int, n: int, tick: int, v: int, way: ReferencePath, near: int, traffic: Traffic
-) -> bool:
+def may_enter_bend(b: int, n: int, tick: int, v: int, way: ReferencePath, near: int, traffic: Traffic) -> bool:
     """Tell whether a car may enter a bend or dead end: there is room behind it, and nobody in it is in its way.
 
     An e-agent enters none that the ego's body meets (E4). Who turns round in one does it alone, unless he stands there;
@@ -134,12 +132,7 @@ def moves_up(b: int, n: int, v: int, degree: Any, traffic: Traffic) -> bool:
     car = traffic.drivers.car[b, n]
     if degree > 2 or minds_goal(v, car, traffic.drivers):
         return False
-    return (
-        degree < 2
-        or not turns_round(car)
-        or take_way_on(b, n, True, traffic)
-        or not is_way_on_free(b, n, traffic)
-    )
+    return degree < 2 or not turns_round(car) or take_way_on(b, n, True, traffic) or not is_way_on_free(b, n, traffic)
 
 
 @jit_inline
@@ -167,9 +160,7 @@ def is_hushed(tick: int, v: int, car: Driver, vehicle: Vehicle, drivers: Drivers
 def faces_gate(b: int, n: int, part: int, traffic: Traffic) -> bool:
     """Tell whether a car is before the disc at the end of its lane."""
     labels, roads, drivers = traffic.labels, traffic.roads, traffic.drivers
-    return part == PART.BEFORE and labels.crosses[b, n] != lane_end(
-        roads, drivers.net[b], drivers.car[b, n].lane
-    )
+    return part == PART.BEFORE and labels.crosses[b, n] != lane_end(roads, drivers.net[b], drivers.car[b, n].lane)
 
 
 @jit_inline

@@ -205,12 +205,12 @@ def is_pressed(b: int, n: int, traffic: Traffic) -> bool:
     if labels.crosses[b, n] >= 0:
         return False
     way = drivers.way[b, n]
-    own = (state.x[b, n] - way.x) * way.tx + (state.y[b, n] - way.y) * way.ty
+    here = (state.x[b, n] - way.x) * way.tx + (state.y[b, n] - way.y) * way.ty
     far = 2.0 * vehicle.reach + PRESSED
     j = scratch.head[lane >> 1]
     while j >= 0:
         along = (state.x[b, j] - way.x) * way.tx + (state.y[b, j] - way.y) * way.ty
-        if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < own:
+        if j != n and labels.lane[b, j] == lane and labels.crosses[b, j] != v and along < here:
             far += 2.0 * vehicle.reach + QUEUE_GAP
         j = scratch.link[j]
     row = int(roads.vert_off[net]) + v

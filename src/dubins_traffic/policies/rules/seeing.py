@@ -254,9 +254,9 @@ def kept_beside(vehicle: Vehicle) -> float:
 @jit_inline
 def has_to_go_back(b: int, n: int, j: int, labels: Labels, car: Driver) -> bool:
     """Tell whether car `j` comes toward the ego n on the ego's side of the road (docs/rules.md#moving-up)."""
-    its, own = np.int64(labels.bits[b, j]), np.int64(labels.bits[b, n])
+    its, ours = np.int64(labels.bits[b, j]), np.int64(labels.bits[b, n])
     comes = car.kind == KIND.ROUND and labels.lane[b, j] == car.lane ^ 1 and labels.crosses[b, n] < 0
-    return comes and its & FLAG.LEFT != 0 and own & FLAG.LEFT == 0
+    return comes and its & FLAG.LEFT != 0 and ours & FLAG.LEFT == 0
 
 
 @jit_inline

@@ -24,27 +24,25 @@ def stays_right(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePat
     """Tell whether a command leaves the body in its lane, or the car overtakes in the next frame for certain."""
     state, labels, obstacles, drivers = traffic.state, traffic.labels, traffic.obstacles, traffic.drivers
     vehicle = drivers.vehicle[b]
-    x, y, c, s = advance(
-        state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, vehicle.period
-    )
+    x, y, c, s = advance(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, vehicle.period)
     half = half_extent(way.tx, way.ty, c, s, vehicle)
     if aside(way, x, y) + half <= vehicle.middle + vehicle.over - LINE:
         return True
     if labels.bits[b, n] & FLAG.OVERTAKING == 0:
         return False
-    own = along(way, x, y)
+    here = along(way, x, y)
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         part = obstacles.parts[p]
         key = along(way, part.x, part.y)
-        there = own - part.reach <= key <= own + part.reach + vehicle.fore
+        there = here - part.reach <= key <= here + part.reach + vehicle.fore
         if there and abs(aside(way, part.x, part.y)) - part.reach < vehicle.middle:
             return True
-    return surely_stands(b, n, own, way, traffic)
+    return surely_stands(b, n, here, way, traffic)
 
 
 @jit
-def surely_stands(b: int, n: int, own: float, way: ReferencePath, traffic: Traffic) -> bool:
-    """Tell whether a car in the way of car n, which is `own` along its lane in the next frame, will stand then too.
+def surely_stands(b: int, n: int, here: float, way: ReferencePath, traffic: Traffic) -> bool:
+    """Tell whether a car in the way of car n, which is `here` along its lane in the next frame, will stand then too.
 
     A standing car may drive off. It also becomes excused, and then is no reason to overtake, when a car ahead of it
     gets its place in the order of the crossing.
@@ -66,7 +64,7 @@ def surely_stands(b: int, n: int, own: float, way: ReferencePath, traffic: Traff
             key = along(way, float(state.x[b, j]), float(state.y[b, j]))
             left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - vehicle.middle
             half = half_across(b, j, way.tx, way.ty, state, vehicle)
-            if own - vehicle.behind + SURE < key < own + vehicle.fore - SURE:
+            if here - vehicle.behind + SURE < key < here + vehicle.fore - SURE:
                 found = found or narrows(left - half, left + half, 2.0 * vehicle.middle, vehicle.needed)
         j = scratch.link[j]
     return found
@@ -77,7 +75,7 @@ def may_drive_on(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether nothing is close ahead of a car where it is in its lane, so that it can pass what is beside it."""
     state, obstacles, drivers, scratch = traffic.state, traffic.obstacles, traffic.drivers, traffic.scratch
     vehicle = drivers.vehicle[b]
-    own, left = along(way, state.x[b, n], state.y[b, n]), aside(way, state.x[b, n], state.y[b, n])
+    here, left = along(way, state.x[b, n], state.y[b, n]), aside(way, state.x[b, n], state.y[b, n])
     wide = half_across(b, n, way.tx, way.ty, state, vehicle) + travel_of(vehicle) + GUARD
     far = 2.0 * vehicle.reach + AHEAD
     j = scratch.head[drivers.car[b, n].lane >> 1]
@@ -87,13 +85,13 @@ def may_drive_on(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
             aside(way, float(state.x[b, j]), float(state.y[b, j])),
         )
         half = half_across(b, j, way.tx, way.ty, state, vehicle)
-        if j != n and own < key < own + far and abs(its - left) < wide + half:
+        if j != n and here < key < here + far and abs(its - left) < wide + half:
             return False
         j = scratch.link[j]
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         part = obstacles.parts[p]
         key, its = along(way, part.x, part.y), aside(way, part.x, part.y)
-        if own < key < own + far + part.reach and abs(its - left) < wide + part.reach:
+        if here < key < here + far + part.reach and abs(its - left) < wide + part.reach:
             return False
     return True
 

@@ -126,9 +126,7 @@ def move(
 
 
 @jit_rare
-def go_aside(
-    b: int, n: int, motion: Motion, line: Line, way: ReferencePath, near: int, traffic: Traffic
-) -> Motion:
+def go_aside(b: int, n: int, motion: Motion, line: Line, way: ReferencePath, near: int, traffic: Traffic) -> Motion:
     """Return the motion of a passing car: aside and back, if `motion` straight aside is not safe or leads to no place.
 
     So it gets past what it touches, or is as near to as it may be. `near` (count) cars are listed.
@@ -145,9 +143,7 @@ def go_aside(
 
 
 @jit_rare
-def goes_on(
-    b: int, n: int, speed: float, outside: bool, way: ReferencePath, near: int, traffic: Traffic
-) -> bool:
+def goes_on(b: int, n: int, speed: float, outside: bool, way: ReferencePath, near: int, traffic: Traffic) -> bool:
     """Tell whether an e-agent to which another car is as close as may be can drive straight past it, on or back."""
     vehicle = traffic.drivers.vehicle[b]
     on = n != EGO and is_safe(b, n, speed, 0.0, near, -1, traffic, vehicle)
@@ -155,9 +151,7 @@ def goes_on(
 
 
 @jit_rare
-def come_back(
-    b: int, n: int, motion: Motion, line: Line, way: ReferencePath, near: int, traffic: Traffic
-) -> Motion:
+def come_back(b: int, n: int, motion: Motion, line: Line, way: ReferencePath, near: int, traffic: Traffic) -> Motion:
     """Return the motion of a car that is left and returns between other cars; `Motion` tells whether it is safe.
 
     `motion` (m/s, rad/s) is the one it would have otherwise; `near` (count) cars are listed. It does not turn toward a
@@ -168,13 +162,13 @@ def come_back(
     safe = motion.safe
     if safe and motion.speed == 0.0 and line.speed >= CREEPS:
         safe = leads_on(b, n, line, STEEP, near, -1, traffic)
-    own = along(way, state.x[b, n], state.y[b, n])
+    here = along(way, state.x[b, n], state.y[b, n])
     if traffic.drivers.car[b, n].until == -INFINITE:
-        retreat = fall_back(b, n, own, line, way, near, traffic)
+        retreat = fall_back(b, n, here, line, way, near, traffic)
         if retreat.safe:
             return retreat
-    far = own < last_return(vehicle) + NARROWLY
-    back = 0.0 if far else backs_off(own, line.left, vehicle)
+    far = here < last_return(vehicle) + NARROWLY
+    back = 0.0 if far else backs_off(here, line.left, vehicle)
     if safe and line.speed >= CREEPS:
         return motion
     if back <= SLANT:
@@ -187,26 +181,24 @@ def come_back(
                 vehicle.yaw_most, 0.0, vehicle.period,
             )  # fmt: skip
             return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
-    retreat = fall_back(b, n, own, line, way, near, traffic)
+    retreat = fall_back(b, n, here, line, way, near, traffic)
     return retreat if retreat.safe else Motion(motion.speed, motion.yaw_rate, safe)
 
 
 @jit_rare
-def fall_back(
-    b: int, n: int, own: float, line: Line, way: ReferencePath, near: int, traffic: Traffic
-) -> Motion:
+def fall_back(b: int, n: int, here: float, line: Line, way: ReferencePath, near: int, traffic: Traffic) -> Motion:
     """Return the motion of a passing car back behind one that has moved up, ahead of which it can't return any more.
 
-    It is at `own` (m) along the lane, and ends its manoeuvre; without such a car (`near` are listed) nothing is safe.
+    It is at `here` (m) along the lane, and ends its manoeuvre; without such a car (`near` are listed) nothing is safe.
     """
     state, scratch, vehicle = traffic.state, traffic.scratch, traffic.drivers.vehicle[b]
     room = 2.0 * vehicle.reach + travel_of(vehicle) + GUARD + WARY
-    last = max(own, last_return(vehicle))
+    last = max(here, last_return(vehicle))
     clear = 0.0
     for k in range(near):
         j = scratch.near[k]
         key, its = along(way, state.x[b, j], state.y[b, j]), aside(way, state.x[b, j], state.y[b, j])
-        if its < vehicle.middle and key - room < own and last < key + room:
+        if its < vehicle.middle and key - room < here and last < key + room:
             clear = max(clear, its + room)
     if clear == 0.0:
         return Motion(0.0, 0.0, False)
@@ -223,14 +215,14 @@ def fall_back(
 
 
 @jit_inline
-def backs_off(own: float, left: float, vehicle: Vehicle) -> float:
+def backs_off(here: float, left: float, vehicle: Vehicle) -> float:
     """Return the sine of the angle back at which a car `left` (m) of its lane's middle keeps off the disc ahead.
 
-    It is at `own` (m) along the lane and goes to the right: along the disc first, so that it is far enough back at the
+    It is at `here` (m) along the lane and goes to the right: along the disc first, so that it is far enough back at the
     centre line, right of which it gets away from the disc.
     """
     over, room = left - vehicle.middle, vehicle.disc + vehicle.reach + CLOSE
-    return (room + own) / over + over / room if over > CLOSE and room + own > 0.0 else 0.0
+    return (room + here) / over + over / room if over > CLOSE and room + here > 0.0 else 0.0
 
 
 @jit_inline
@@ -287,8 +279,8 @@ def room_to_return(b: int, n: int, way: ReferencePath, traffic: Traffic) -> floa
     An e-agent takes no place in the order of a crossing meanwhile, since it could not enter on its turn (E3).
     """
     vehicle = traffic.drivers.vehicle[b]
-    own = along(way, traffic.state.x[b, n], traffic.state.y[b, n])
-    return max(last_return(vehicle) - (vehicle.approaches if n != EGO else 0.0) - own, 0.0)
+    here = along(way, traffic.state.x[b, n], traffic.state.y[b, n])
+    return max(last_return(vehicle) - (vehicle.approaches if n != EGO else 0.0) - here, 0.0)
 
 
 @jit_inline

@@ -317,15 +317,13 @@ def vehicles_of(problems: Sequence[Problem], disturbed: Sequence[bool] = ()) -> 
     kinds, index = distinct_problems(problems)
     made: Any = _vehicles_of(kinds)
     rows = made[index]
-    first, alike = distinct(
-        [(own, id(problem.network)) for own, problem in zip(index, problems, strict=True)]
-    )
+    first, alike = distinct([(number, id(problem.network)) for number, problem in zip(index, problems, strict=True)])
     least = np.array([least_speed(problems[k]) for k in first])
     rows["dawdle"] = np.maximum(DAWDLE, least)[alike]
-    for own, problem in compress(zip(rows, problems, strict=True), disturbed):
-        own.late, own.unsure, own.blur = problem.command_delay, problem.unsure, problem.blur
-        own.over -= own.unsure
-        own.near = near_of(problem.car, problem.period * (1.0 + own.late)) + 2.0 * own.unsure
+    for row, problem in compress(zip(rows, problems, strict=True), disturbed):
+        row.late, row.unsure, row.blur = problem.command_delay, problem.unsure, problem.blur
+        row.over -= row.unsure
+        row.near = near_of(problem.car, problem.period * (1.0 + row.late)) + 2.0 * row.unsure
     return rows
 
 
@@ -341,23 +339,23 @@ def _vehicles_of(problems: Sequence[Problem]) -> Rows[Vehicle]:
     rows["slowest"] = cars.speed_low
     widths = (2.0 * (cars.half_width + cars.rounding)).tolist()
     for k, (problem, width) in enumerate(zip(problems, widths, strict=True)):
-        own, rules = rows[k], RuleParameters.from_mapping(problem.rules)
-        own.disc = problem.intersection_radius
-        own.period = problem.period
-        own.degree = rules.crossing_degree
-        own.near = near_of(problem.car, problem.period)
-        own.sight = sight_of(problem.car.w)
-        own.forfeit = rules.forfeit_time
-        own.through_speed = through_speed(problem)
-        own.over = rules.left_set
-        own.behind = rules.overtaking_behind
-        own.fore = rules.overtaking_ahead
-        own.needed = rules.width_needed(width, problem.car.point_speed * problem.period)
-        own.left_time = rules.left_time
-        own.stand_time = rules.stand_time
-        own.backs_up = rules.turn_back
-        own.exit_room = rules.room_beyond(own.reach, 3)
-        own.rest_time = rules.rest_time
-        own.approaches = rules.approach_distance
-        own.goal_time = rules.goal_time
+        row, rules = rows[k], RuleParameters.from_mapping(problem.rules)
+        row.disc = problem.intersection_radius
+        row.period = problem.period
+        row.degree = rules.crossing_degree
+        row.near = near_of(problem.car, problem.period)
+        row.sight = sight_of(problem.car.w)
+        row.forfeit = rules.forfeit_time
+        row.through_speed = through_speed(problem)
+        row.over = rules.left_set
+        row.behind = rules.overtaking_behind
+        row.fore = rules.overtaking_ahead
+        row.needed = rules.width_needed(width, problem.car.point_speed * problem.period)
+        row.left_time = rules.left_time
+        row.stand_time = rules.stand_time
+        row.backs_up = rules.turn_back
+        row.exit_room = rules.room_beyond(row.reach, 3)
+        row.rest_time = rules.rest_time
+        row.approaches = rules.approach_distance
+        row.goal_time = rules.goal_time
     return rows

@@ -73,24 +73,24 @@ def unroll(b: int, n: int, traffic: Traffic) -> None:
     )  # fmt: skip
     net = drivers.net[b]
     lane = lane_of(b, n, traffic)
-    own = roads.segment[int(roads.seg_off[net]) + (lane >> 1)]
+    segment = roads.segment[int(roads.seg_off[net]) + (lane >> 1)]
     back = lane & 1 != 0
     middle = drivers.vehicle[b].middle
     first, last = lane_start(roads, net, lane), lane_end(roads, net, lane)
     tx, ty = lane_end_direction(roads, net, lane)
     ux, uy = lane_direction(roads, net, lane)
     end, start = roads.vertex[int(roads.vert_off[net]) + last], roads.vertex[int(roads.vert_off[net]) + first]
-    length = to_end(roads.piece, own, back, own.last if back else own.piece, 0.0, middle)
+    length = to_end(roads.piece, segment, back, segment.last if back else segment.piece, 0.0, middle)
     scratch.tight[0] = tightness(roads, net, lane, middle)
     unroll_obstacles(b, n, traffic)
     for j in range(state.count[b]):
         x, y, c, s = state.x[b, j], state.y[b, j], state.c[b, j], state.s[b, j]
         scratch.real[0, j], scratch.real[1, j], scratch.real[2, j], scratch.real[3, j] = x, y, c, s
         if labels.segment[b, j] == lane >> 1:
-            k, gone, left, dx, dy = place(roads.piece, own, back, x, y)
-            if k == (own.piece if back else own.last):
+            k, gone, left, dx, dy = place(roads.piece, segment, back, x, y)
+            if k == (segment.piece if back else segment.last):
                 continue
-            along = -to_end(roads.piece, own, back, k, gone, middle)
+            along = -to_end(roads.piece, segment, back, k, gone, middle)
         elif vertex_distance2(roads, net, first, x, y) < vertex_distance2(roads, net, last, x, y):
             rx, ry = x - start.x, y - start.y
             along = rx * ux + ry * uy - length
@@ -112,7 +112,7 @@ def unroll_obstacles(b: int, n: int, traffic: Traffic) -> None:
     roads, obstacles, drivers, scratch = traffic.roads, traffic.obstacles, traffic.drivers, traffic.scratch
     net, vehicle = drivers.net[b], drivers.vehicle[b]
     lane = lane_of(b, n, traffic)
-    own = roads.segment[int(roads.seg_off[net]) + (lane >> 1)]
+    segment = roads.segment[int(roads.seg_off[net]) + (lane >> 1)]
     back = lane & 1 != 0
     last = lane_end(roads, net, lane)
     end = roads.vertex[int(roads.vert_off[net]) + last]
@@ -123,15 +123,15 @@ def unroll_obstacles(b: int, n: int, traffic: Traffic) -> None:
         real = scratch.real_part
         real[0, q], real[1, q], real[2, q], real[3, q] = x, y, c, s
         edge = float(roads.half_width[net]) + part.reach + BESIDE
-        if bent_distance2(roads.piece, own, x, y) > edge * edge:
+        if bent_distance2(roads.piece, segment, x, y) > edge * edge:
             near = vehicle.disc + part.reach + AROUND
             if vertex_distance2(roads, net, last, x, y) > near * near:
                 part.x += AWAY
             continue
-        k, gone, left, dx, dy = place(roads.piece, own, back, x, y)
-        if k == (own.piece if back else own.last):
+        k, gone, left, dx, dy = place(roads.piece, segment, back, x, y)
+        if k == (segment.piece if back else segment.last):
             continue
-        along = -to_end(roads.piece, own, back, k, gone, vehicle.middle)
+        along = -to_end(roads.piece, segment, back, k, gone, vehicle.middle)
         cosine = dx * c + dy * s
         sine = dx * s - dy * c
         part.x = end.x + along * tx - left * ty
@@ -165,9 +165,9 @@ def roll_up(b: int, n: int, traffic: Traffic, commands: Floats) -> None:
     if speed == 0.0:
         return
     lane = lane_of(b, n, traffic)
-    own = roads.segment[int(roads.seg_off[drivers.net[b]]) + (lane >> 1)]
+    segment = roads.segment[int(roads.seg_off[drivers.net[b]]) + (lane >> 1)]
     pose = Pose(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n])
-    k, _, left, dx, dy = place(roads.piece, own, lane & 1 != 0, pose.x, pose.y)
+    k, _, left, dx, dy = place(roads.piece, segment, lane & 1 != 0, pose.x, pose.y)
     bend = curvature(roads.piece[k], lane & 1 != 0)
     turn = bend * (dx * pose.c + dy * pose.s) / max(1.0 - bend * left, 0.1)
     if abs(turn * speed) > SHARE * vehicle.yaw_most:
@@ -205,7 +205,7 @@ def keeps_right(b: int, n: int, pose: Pose, command: Command, watched: int, traf
     if lane < 0 or bits & FLAG.LEFT != 0 or traffic.drivers.car[b, n].violations & VIOLATION.LEFT_SIDE != 0:
         return True
     x, y, c, s = advance(pose.x, pose.y, pose.c, pose.s, command.speed, command.yaw_rate, vehicle.period)
-    own, left = lane_coordinates(roads, net, lane, x, y)
+    here, left = lane_coordinates(roads, net, lane, x, y)
     tx, ty = lane_direction_at(roads, net, lane, x, y)
     half = half_extent(tx, ty, c, s, vehicle)
     if left + half <= vehicle.over - LINE:
@@ -215,17 +215,13 @@ def keeps_right(b: int, n: int, pose: Pose, command: Command, watched: int, traf
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         part = obstacles.parts[p]
         key, its = lane_coordinates(roads, net, lane, part.x, part.y)
-        if own - part.reach <= key <= own + part.reach + vehicle.fore and abs(its + vehicle.middle) < (
+        if here - part.reach <= key <= here + part.reach + vehicle.fore and abs(its + vehicle.middle) < (
             vehicle.middle + part.reach
         ):
             return True
     for j in range(state.count[b]):
         its_bits = np.int64(labels.bits[b, j])
-        if (
-            j != n
-            and labels.lane[b, j] == lane
-            and its_bits & (FLAG.APPROACH | FLAG.STOPPED) == FLAG.APPROACH
-        ):
+        if j != n and labels.lane[b, j] == lane and its_bits & (FLAG.APPROACH | FLAG.STOPPED) == FLAG.APPROACH:
             return False
     if watched < 0 or labels.bits[b, watched] & FLAG.STANDS == 0:
         return False
@@ -233,7 +229,7 @@ def keeps_right(b: int, n: int, pose: Pose, command: Command, watched: int, traf
     key, its = lane_coordinates(roads, net, lane, x, y)
     tx, ty = lane_direction_at(roads, net, lane, x, y)
     half = half_across(b, watched, tx, ty, state, vehicle)
-    there = own - vehicle.behind + SURE < key < own + vehicle.fore - SURE
+    there = here - vehicle.behind + SURE < key < here + vehicle.fore - SURE
     return there and narrows(its - half, its + half, 2.0 * vehicle.middle, vehicle.needed)
 
 
@@ -259,13 +255,13 @@ def curvature(piece: Piece, back: bool) -> float:
 
 @jit
 def place(
-    pieces: Rows[Piece], own: Segment, back: bool, x: float, y: float
+    pieces: Rows[Piece], segment: Segment, back: bool, x: float, y: float
 ) -> tuple[int, float, float, float, float]:
     """Return (piece, metres along it in the lane's direction, metres left of the lane's line, direction) of a point.
 
-    The lane is one of the segment `own` (row), from its second to its first end if `back` (flag).
+    The lane is one of the segment `segment` (row), from its second to its first end if `back` (flag).
     """
-    k, _ = nearest_piece(pieces, own, x, y)
+    k, _ = nearest_piece(pieces, segment, x, y)
     along, left, dx, dy = piece_foot(pieces[k], x, y)
     if back:
         return k, pieces[k].length - along, -left, -dx, -dy
@@ -273,15 +269,15 @@ def place(
 
 
 @jit
-def to_end(pieces: Rows[Piece], own: Segment, back: bool, k: int, gone: float, middle: float) -> float:
+def to_end(pieces: Rows[Piece], segment: Segment, back: bool, k: int, gone: float, middle: float) -> float:
     """Return metres to the end of a lane from `gone` (m) along piece `k` (row), measured `middle` (m) to the right.
 
-    The lane is one of the segment `own` (row), from its second to its first end if `back` (flag).
+    The lane is one of the segment `segment` (row), from its second to its first end if `back` (flag).
     """
     at = pieces[k]
     far = (at.length - gone) * (1.0 + curvature(at, back) * middle)
     step = -1 if back else 1
-    stop = own.piece if back else own.last
+    stop = segment.piece if back else segment.last
     while k != stop:
         k += step
         far += pieces[k].length * (1.0 + curvature(pieces[k], back) * middle)

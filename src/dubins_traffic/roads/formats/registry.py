@@ -26,9 +26,7 @@ LOSSES = "losses"
 """The key under which a network keeps what was lost of the map from which it comes."""
 GROUP = "dubins_traffic.map_formats"
 """Entry points of other packages."""
-_SEAM = Seam(
-    "--map-format", "map format", ("sniff", "read"), "sniff(text) -> bool and read(text, file) -> mapping"
-)
+_SEAM = Seam("--map-format", "map format", ("sniff", "read"), "sniff(text) -> bool and read(text, file) -> mapping")
 
 
 class MapFormat(Protocol):
@@ -110,8 +108,8 @@ def load(spec: str) -> MapFormat:
         if form.name == spec:
             return form
     if not outside.is_place(spec):
-        own = ", ".join(form.name for form in registered())
-        raise _SEAM.refuse("unknown map format", spec, f"one of {own}, module:Class or path/to/file.py:Class")
+        known = ", ".join(form.name for form in registered())
+        raise _SEAM.refuse("unknown map format", spec, f"one of {known}, module:Class or path/to/file.py:Class")
     return _made(outside.find(spec, _SEAM), spec)
 
 
@@ -140,9 +138,7 @@ def of_text(text: str) -> MapFormat:
 
 def is_map(text: str) -> bool:
     """Tell whether a text is to hold a road network: it is one, or XML, and no JSON, which other documents are, too."""
-    return text.lstrip()[:1] not in ("", "{", "[") and (
-        is_xml(text) or sniffed(text) is not None or may_be(text)
-    )
+    return text.lstrip()[:1] not in ("", "{", "[") and (is_xml(text) or sniffed(text) is not None or may_be(text))
 
 
 def of_suffix(path: str | Path, further: MapFormat | None = None) -> WritesMaps | None:
@@ -176,7 +172,7 @@ def document(form: MapFormat, text: str, file: str | None) -> tuple[Mapping[str,
     if form is _built_in()["rnd-text"] and is_xml(text):
         root = root_name(text)
         problem = f"XML that is no map: its root is <{root}>" if root else "XML that ends before its root"
-        known = [own.name for own in registered() if isinstance(own, ReducesMaps)]
+        known = [form.name for form in registered() if isinstance(form, ReducesMaps)]
         raise InputError(problem, file=file, expected=f"a whole map: {' or '.join(known)}")
     try:
         return form.reduced(text, file) if isinstance(form, ReducesMaps) else (form.read(text, file), None)

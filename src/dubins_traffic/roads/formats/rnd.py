@@ -221,16 +221,9 @@ def _corners(row: list[Any] | None, s: int, entry: Any) -> Corners:
     found: list[tuple[float, float, float]] = []
     for k, triple in enumerate(triples):
         right = triple is not None and len(triple) == 3 and all(is_finite(number) for number in triple)
-        if (
-            triple is None
-            or not right
-            or max(abs(number) for number in triple) > LARGEST_POINT
-            or triple[2] <= 0
-        ):
+        if triple is None or not right or max(abs(number) for number in triple) > LARGEST_POINT or triple[2] <= 0:
             expected = f"[x, y, radius], a radius above 0, numbers up to {LARGEST_POINT}"
-            raise InputError(
-                f"corner {k}: not a corner", field=f"segments[{s}]", value=triple, expected=expected
-            )
+            raise InputError(f"corner {k}: not a corner", field=f"segments[{s}]", value=triple, expected=expected)
         found.append((_plain(triple[0]), _plain(triple[1]), _plain(triple[2])))
     return tuple(found)
 
@@ -278,8 +271,8 @@ class RndJson:
 
     def sniff(self, text: str) -> bool:
         """Tell whether a text is an object with segments or the shape of a grid, and not a document around one."""
-        own = text.lstrip()[:1] == "{" and ('"segments"' in text or '"shape"' in text)
-        return own and '"rnd"' not in text and '"problem_domain"' not in text
+        is_network = text.lstrip()[:1] == "{" and ('"segments"' in text or '"shape"' in text)
+        return is_network and '"rnd"' not in text and '"problem_domain"' not in text
 
     def read(self, text: str, file: str | None = None) -> Mapping[str, Any]:
         """Return the document in a text."""
@@ -417,9 +410,7 @@ def _entry(line: str, number: int, file: str | None) -> tuple[str, str]:
     key, colon, value = line.partition(":")
     key = key.strip()
     if not colon or not key:
-        raise InputError(
-            f"not a line of RND text (line {number})", file=file, value=line, expected="key: values"
-        )
+        raise InputError(f"not a line of RND text (line {number})", file=file, value=line, expected="key: values")
     if key.startswith('"'):
         decoded = _value(key)
         key = decoded if isinstance(decoded, str) else key

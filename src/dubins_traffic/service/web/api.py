@@ -81,9 +81,7 @@ class Api(Controller):
         sync_to_thread=True,
         guards=[requests.person],
     )
-    def submissions(
-        self, service: ServiceHere, viewer: ViewerHere, slug: Name, name: Name
-    ) -> list[dict[str, Any]]:
+    def submissions(self, service: ServiceHere, viewer: ViewerHere, slug: Name, name: Name) -> list[dict[str, Any]]:
         """Return the submissions of the own team to a phase, newest first."""
         with service.database.reading() as session:
             row = receiving.phase_named(session, slug, name)
@@ -92,8 +90,7 @@ class Api(Controller):
             places = queue.places(session, service.clock())
             its_submissions = receiving.submissions_of(session, row, viewer.person.team_id)
             return [
-                viewing.submission_document(service, session, one, viewer.person, places)
-                for one in its_submissions
+                viewing.submission_document(service, session, one, viewer.person, places) for one in its_submissions
             ]
 
     @post(
@@ -132,9 +129,7 @@ class Api(Controller):
         """Return the logs of a submission that may be seen: of all trials, or the tail of one."""
         submission = _view(service, viewer, number)
         if "trials" in submission:
-            return {
-                "trials": [{"number": trial["number"], "log": trial["log"]} for trial in submission["trials"]]
-            }
+            return {"trials": [{"number": trial["number"], "log": trial["log"]} for trial in submission["trials"]]}
         return {"log": submission.get("log", "")}
 
 
@@ -156,9 +151,7 @@ def metrics(service: ServiceHere, viewer: ViewerHere) -> Response[bytes]:
         status = viewing.status_document(service, session)
         states = session.execute(select(Submission.state, func.count()).group_by(Submission.state)).all()
     for name in ("waiting", "running", "workers"):
-        Gauge(f"dubins_traffic_{name}", f"{name}, see the page of the queue", registry=registry).set(
-            status[name]
-        )
+        Gauge(f"dubins_traffic_{name}", f"{name}, see the page of the queue", registry=registry).set(status[name])
     gauge = Gauge("dubins_traffic_submissions", "submissions by state", ["state"], registry=registry)
     for state, count in states:
         gauge.labels(state).set(count)

@@ -129,9 +129,7 @@ def create_app(service: Service) -> Litestar:
         return service
 
     handlers = (pages.Pages, pages.Submitting, pages.Login, pages.Teams, organisers.Organisers, api.Api)
-    files = create_static_files_router(
-        "/static", [Path(__file__).with_name("static")], include_in_schema=False
-    )
+    files = create_static_files_router("/static", [Path(__file__).with_name("static")], include_in_schema=False)
     kept = SessionFiles(service.folder / "sessions", create_directories=True)
     return Litestar(
         route_handlers=[*handlers, worker_api.WorkerApi, api.metrics, files],

@@ -83,9 +83,7 @@ class Organisers(Controller):
         return _shown(service, viewer)
 
     @post("/create", sync_to_thread=True, opt={requests.FILES: True})
-    def create(
-        self, service: ServiceHere, viewer: ViewerHere, data: MultipartBody[NewCompetition]
-    ) -> Redirect:
+    def create(self, service: ServiceHere, viewer: ViewerHere, data: MultipartBody[NewCompetition]) -> Redirect:
         """Make a competition from its files."""
         made = organising.create(service, data.address, _given(data.files), viewer.person)
         return Redirect(f"/desk/c/{made.slug}", status_code=303)
@@ -109,9 +107,7 @@ class Organisers(Controller):
         """Revoke an invitation, whoever has made it; an organiser of one competition only the own ones."""
         with service.database.writing() as session:
             accounts.revoke_invitation(session, number, service.clock(), made_by=_maker(viewer))
-            accounts.note(
-                session, viewer.person, "revoke invitation", f"invitation {number}", "", service.clock()
-            )
+            accounts.note(session, viewer.person, "revoke invitation", f"invitation {number}", "", service.clock())
         return Redirect("/desk", status_code=303)
 
     @post("/worker", sync_to_thread=True, status_code=200)
@@ -173,8 +169,7 @@ class Organisers(Controller):
             for phase, shown in zip(row.phases, document["phases"], strict=True):
                 its_submissions = receiving.submissions_of(session, phase, None)
                 shown["submissions"] = [
-                    {"row": one, "team": one.team.name, "place": places.get(one.id)}
-                    for one in its_submissions
+                    {"row": one, "team": one.team.name, "place": places.get(one.id)} for one in its_submissions
                 ]
         given = {"competition": document, "news": news, "controllers": list(registry.names())}
         return page(service, viewer, "organise", f"Organise {document['title']}", **given)
@@ -213,15 +208,11 @@ class Organisers(Controller):
         return Redirect(f"/desk/c/{slug}", status_code=303)
 
     @post("/news/{slug:str}", sync_to_thread=True)
-    def announce(
-        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], data: Given
-    ) -> Redirect:
+    def announce(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], data: Given) -> Redirect:
         """Tell everybody something."""
         with service.database.writing() as session:
             row = receiving.competition_named(session, slug)
-            organising.announce(
-                service, session, row, viewer.person, data.get("title", ""), data.get("text", "")
-            )
+            organising.announce(service, session, row, viewer.person, data.get("title", ""), data.get("text", ""))
         return Redirect(f"/c/{slug}", status_code=303)
 
     @get("/retract/{number:int}", sync_to_thread=True, opt={requests.OWN: True})

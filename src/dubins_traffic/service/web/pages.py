@@ -114,9 +114,7 @@ class Pages(Controller):
         return _picture(part("service/web/static/trial.svg"), HOUR)
 
     @get("/c/{slug:str}/{name:str}", sync_to_thread=True)
-    def phase(
-        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
-    ) -> Template:
+    def phase(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]) -> Template:
         """Show a phase: rules, limits, the form to submit, the own submissions."""
         at, account = service.clock(), viewer.account
         with service.database.reading() as session:
@@ -145,9 +143,7 @@ class Pages(Controller):
             "competition": title,
         }
         largest = service.settings.largest_upload
-        return page(
-            service, viewer, "phase", f"{title}: {name}", largest=largest, wall_bounds=WALL_S, **given
-        )
+        return page(service, viewer, "phase", f"{title}: {name}", largest=largest, wall_bounds=WALL_S, **given)
 
     @get("/c/{slug:str}/{name:str}/table", sync_to_thread=True)
     def table(
@@ -181,9 +177,7 @@ class Pages(Controller):
         return Response(texts.csv_of(rows), media_type="text/csv; charset=utf-8")
 
     @get("/c/{slug:str}/news.atom", sync_to_thread=True)
-    def feed(
-        self, request: Request[Any, Any, Any], service: ServiceHere, slug: FromPath[str]
-    ) -> Response[bytes]:
+    def feed(self, request: Request[Any, Any, Any], service: ServiceHere, slug: FromPath[str]) -> Response[bytes]:
         """Return the announcements of a competition as an Atom feed."""
         with service.database.reading() as session:
             row = receiving.competition_named(session, slug)
@@ -192,18 +186,14 @@ class Pages(Controller):
         return Response(texts.feed(url, row.title, row.created, news), media_type="application/atom+xml")
 
     @get("/pages/{slug:str}/{name:str}", sync_to_thread=True)
-    def text(
-        self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]
-    ) -> Template:
+    def text(self, service: ServiceHere, viewer: ViewerHere, slug: FromPath[str], name: FromPath[str]) -> Template:
         """Show a further text of a competition."""
         with service.database.reading() as session:
             row = receiving.competition_named(session, slug)
             text = service.competition(row).model.pages.get(name)
         if text is None:
             raise NotFoundException("no such page")
-        return page(
-            service, viewer, "text", f"{row.title}: {name}", slug=slug, competition=row.title, text=text
-        )
+        return page(service, viewer, "text", f"{row.title}: {name}", slug=slug, competition=row.title, text=text)
 
     @get("/c/{slug:str}/{name:str}/commitment.json", sync_to_thread=True)
     def commitment(self, service: ServiceHere, slug: FromPath[str], name: FromPath[str]) -> Response[str]:
@@ -226,9 +216,7 @@ class Pages(Controller):
         return Response(path.read_text(encoding="utf-8"), media_type=MediaType.TEXT)
 
     @get("/s/{number:int}/trials/{trial:int}", sync_to_thread=True)
-    def trial(
-        self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]
-    ) -> Template:
+    def trial(self, service: ServiceHere, viewer: ViewerHere, number: FromPath[int], trial: FromPath[int]) -> Template:
         """Show a trial: its score, its log, its replay."""
         with service.database.reading() as session:
             submission, row_of_trial = _seen(service, viewer, number, trial, session)
@@ -376,9 +364,7 @@ def _view(service: Service, viewer: Viewer, number: int) -> dict[str, Any]:
     with service.database.reading() as session:
         submission = receiving.submission_numbered(session, number, viewer.account)
         places = queue.places(session, service.clock())
-        document = viewing.submission_document(
-            service, session, submission, viewer.account, places, logs=False
-        )
+        document = viewing.submission_document(service, session, submission, viewer.account, places, logs=False)
         differing = viewing.differing(service, session, submission) if "trials" in document else []
         given: dict[str, Any] = {
             "differing": differing,
@@ -502,9 +488,7 @@ class Teams(Controller):
         with service.database.writing() as session:
             account = _still(session, sure)
             accounts.remove(session, account, service.clock())
-            accounts.note(
-                session, None, "remove account", f"account {account.id}", "by its owner", service.clock()
-            )
+            accounts.note(session, None, "remove account", f"account {account.id}", "by its owner", service.clock())
         request.clear_session()
         return Redirect("/", status_code=303)
 
@@ -541,9 +525,7 @@ def _shown(service: Service, viewer: Viewer, code: str = "", token: str = "") ->
         tokens = accounts.tokens(session, viewer.person)
         invitations = () if team is None else accounts.invitations(session, service.clock(), team.id)
     given = {"team": team, "members": members, "tokens": tokens, "invitations": invitations, "phases": phases}
-    return page(
-        service, viewer, "team", "Team and account", url=service.settings.url, code=code, token=token, **given
-    )
+    return page(service, viewer, "team", "Team and account", url=service.settings.url, code=code, token=token, **given)
 
 
 Asked = Request[Any, Any, Any]
@@ -560,9 +542,7 @@ class Login(Controller):
         return page(service, viewer, "login", "Log in", wrong="", name="")
 
     @post("/login", sync_to_thread=True, status_code=200)
-    def login(
-        self, request: Asked, service: ServiceHere, viewer: ViewerHere, data: Given
-    ) -> Template | Redirect:
+    def login(self, request: Asked, service: ServiceHere, viewer: ViewerHere, data: Given) -> Template | Redirect:
         """Log in."""
         with service.database.reading() as session:
             account = accounts.verified(session, data.get("name", ""), data.get("password", ""))
@@ -583,9 +563,7 @@ class Login(Controller):
         return page(service, viewer, "join", "Join", wrong="", given={"code": code})
 
     @post("/join", sync_to_thread=True, status_code=200)
-    def join(
-        self, request: Asked, service: ServiceHere, viewer: ViewerHere, data: Given
-    ) -> Template | Redirect:
+    def join(self, request: Asked, service: ServiceHere, viewer: ViewerHere, data: Given) -> Template | Redirect:
         """Make an account by an invitation, and log in."""
         try:
             account = accounts.join(
@@ -606,14 +584,10 @@ class Login(Controller):
         return page(service, viewer, "reset", "New password", wrong="", code=code)
 
     @post("/reset", sync_to_thread=True, status_code=200)
-    def reset(
-        self, request: Asked, service: ServiceHere, viewer: ViewerHere, data: Given
-    ) -> Template | Redirect:
+    def reset(self, request: Asked, service: ServiceHere, viewer: ViewerHere, data: Given) -> Template | Redirect:
         """Set a new password by a code, and log in."""
         try:
-            account = accounts.reset(
-                service.database, data.get("code", ""), data.get("password", ""), service.clock()
-            )
+            account = accounts.reset(service.database, data.get("code", ""), data.get("password", ""), service.clock())
         except WrongEntryError as error:
             return page(service, viewer, "reset", "New password", wrong=str(error), code=data.get("code", ""))
         return _enter(request, account)

@@ -62,9 +62,7 @@ class PatientProtocol(H11Protocol):
 
     def _is_slow(self) -> bool:
         """Tell whether the other end has had its time."""
-        if self._left and (
-            self._stuck > PATIENCE or self._blocked > PATIENCE + (self._most - self._left) // SLOWEST
-        ):
+        if self._left and (self._stuck > PATIENCE or self._blocked > PATIENCE + (self._most - self._left) // SLOWEST):
             return True
         if self.conn.their_state is h11.SEND_BODY:
             return self._silent > PATIENCE or self._looks > PATIENCE + self._come // SLOWEST

@@ -113,10 +113,7 @@ class WorkerApi(Controller):
     def submission(self, service: ServiceHere, digest: Digest) -> Response[bytes]:
         """Return what a team has sent, by its SHA-256."""
         with service.database.reading() as session:
-            if (
-                session.scalars(select(Submission.id).where(Submission.digest == digest).limit(1)).first()
-                is None
-            ):
+            if session.scalars(select(Submission.id).where(Submission.digest == digest).limit(1)).first() is None:
                 raise NotFoundException("no such submission")
         return Response(service.storage.get(digest, "submissions"), media_type="application/octet-stream")
 
@@ -132,9 +129,7 @@ class WorkerApi(Controller):
         service.database.patiently(renew)
 
     @post("/chunks/{number:int}/trials/{trial:int}/seed", sync_to_thread=True, status_code=HTTP_200_OK)
-    def seed(
-        self, service: ServiceHere, number: FromPath[int], trial: FromPath[int], data: JSONBody[Held]
-    ) -> SeedOf:
+    def seed(self, service: ServiceHere, number: FromPath[int], trial: FromPath[int], data: JSONBody[Held]) -> SeedOf:
         """Return the seed of a trial on lease, which is about to be run."""
         with service.database.reading() as session:
             chunk = queue.held(session, number, data.token)

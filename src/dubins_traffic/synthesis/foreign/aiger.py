@@ -102,9 +102,7 @@ class _Reader:
     def circuit(self) -> Circuit:
         """Return the machine."""
         count = self._inputs
-        inputs = (
-            [2 * k + 2 for k in range(count)] if self._binary else [self._numbers()[0] for _ in range(count)]
-        )
+        inputs = [2 * k + 2 for k in range(count)] if self._binary else [self._numbers()[0] for _ in range(count)]
         latches = [self._latch(k) for k in range(self._latches)]
         outputs = [self._numbers()[0] for _ in range(self._outputs)]
         gates = [self._binary_gate(k) if self._binary else self._gate() for k in range(self._gates)]

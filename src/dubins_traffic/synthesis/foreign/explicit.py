@@ -33,8 +33,7 @@ def read_slugs_json(document: Any) -> Explicit:
         sides = None if document.get("variables") else _declared(document)
         names = [str(name) for name in (document["variables"] if sides is None else [*sides[0], *sides[1]])]
         nodes = {
-            key: ([bool(bit) for bit in node["state"]], list(node["trans"]))
-            for key, node in document["nodes"].items()
+            key: ([bool(bit) for bit in node["state"]], list(node["trans"])) for key, node in document["nodes"].items()
         }
         initial = [key for key, node in document["nodes"].items() if node.get("initial")]
     except (KeyError, TypeError, AttributeError):
@@ -113,9 +112,7 @@ def read_tulip(text: str) -> Explicit:
     except (SyntaxError, ValueError, KeyError, AssertionError, AttributeError, RecursionError, MemoryError):
         raise damaged(TULIP, "not as tulip.dumpsmach writes it") from None
     names = dict.fromkeys(name for out in edges.values() for edge in out for name in edge.cube)
-    return Explicit(
-        edges, first, list(names), Sides(list(read), [name for name in names if name not in read])
-    )
+    return Explicit(edges, first, list(names), Sides(list(read), [name for name in names if name not in read]))
 
 
 def _parsed(text: str) -> ast.Module:

@@ -70,9 +70,7 @@ def _joined(edges: dict[State, list[Edge]], start: int, players: list[int]) -> d
                 raise damaged(WHAT, "an edge that does not lead from player 0 to player 1", value=state)
             for answer in edges[edge.target]:
                 if whose.get(answer.target) != 0:
-                    raise damaged(
-                        WHAT, "an edge that does not lead from player 1 to player 0", value=edge.target
-                    )
+                    raise damaged(WHAT, "an edge that does not lead from player 1 to player 0", value=edge.target)
                 joined[state].append(Edge({**edge.cube, **answer.cube}, answer.target))
                 literals += len(edge.cube) + len(answer.cube) + 1
                 if literals > MOST_LITERALS:
@@ -92,8 +90,7 @@ def _header(tokens: list[str]) -> tuple[list[str], int, Sides | None, list[int]]
     """
     places = [place for place, token in enumerate(tokens) if token.endswith(":")]
     items = [
-        (tokens[place], tokens[place + 1 : end])
-        for place, end in zip(places, [*places[1:], len(tokens)], strict=True)
+        (tokens[place], tokens[place + 1 : end]) for place, end in zip(places, [*places[1:], len(tokens)], strict=True)
     ]
     start = [values for key, values in items if key == "Start:"]
     names = [values for key, values in items if key == "AP:"]
@@ -110,12 +107,7 @@ def _header(tokens: list[str]) -> tuple[list[str], int, Sides | None, list[int]]
         names_of_props,
         _number(start[0], 0),
         _sides(names_of_props, [item for key, item in items if key == "controllable-AP:"]),
-        [
-            _number(item, place)
-            for key, item in items
-            if key == "spot-state-player:"
-            for place in range(len(item))
-        ],
+        [_number(item, place) for key, item in items if key == "spot-state-player:" for place in range(len(item))],
     )
 
 

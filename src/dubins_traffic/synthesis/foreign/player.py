@@ -71,9 +71,7 @@ class Labelled:
         options = self.options(place)[1:]
         road_cells, nodes = self.board.road_cells, len(self.board.road_cells.nodes)
         if cell_now < nodes:
-            free = [
-                nodes + lane for lane in road_cells.nodes[cell_now].exits if nodes + lane not in place.cells
-            ]
+            free = [nodes + lane for lane in road_cells.nodes[cell_now].exits if nodes + lane not in place.cells]
         else:
             free = [road_cells.lane_end[cell_now - nodes][0]]
         ways = dict(zip(free, options, strict=False))

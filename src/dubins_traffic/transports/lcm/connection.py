@@ -107,14 +107,10 @@ def check_route(url: str) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
         try:
             probe.connect((group, port))
-            probe.setsockopt(
-                socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + b"\0\0\0\0"
-            )
+            probe.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, socket.inet_aton(group) + b"\0\0\0\0")
         except OSError as error:
             if not _is_multicast(group):
-                raise InputError(
-                    "not a multicast group", file="--url", value=url, expected=EXPECTED
-                ) from error
+                raise InputError("not a multicast group", file="--url", value=url, expected=EXPECTED) from error
             raise TransportError(
                 f"no route for LCM's multicast to {group} ({error.strerror}); this adds one within this machine: "
                 "sudo ip link set lo multicast on && sudo ip route add 224.0.0.0/4 dev lo"

@@ -65,9 +65,7 @@ def observation_from_message(message: state_t, problem: Problem) -> Observation:
         Twist(ego.speed, ego.yaw_rate),
         _propositions(ego),
         tuple(
-            SensedCar(
-                car.name, car.index, _pose(car), Twist(car.speed, car.yaw_rate), body, _propositions(car)
-            )
+            SensedCar(car.name, car.index, _pose(car), Twist(car.speed, car.yaw_rate), body, _propositions(car))
             for car in others
         ),
         np.array(scan, dtype=np.float64) if scan else None,
@@ -86,8 +84,7 @@ class Encoder:
         """Return the `state_t` of the driver of `car`; bodies are left out: all cars are alike."""
         names = self._names
         others = [
-            names[other.index] + CAR.pack(*other.pose, *other.twist, *other.propositions)
-            for other in seen.others
+            names[other.index] + CAR.pack(*other.pose, *other.twist, *other.propositions) for other in seen.others
         ]
         ranges = b"" if seen.scan is None else seen.scan.astype(">f8").tobytes()
         return b"".join(
@@ -107,9 +104,7 @@ class Encoder:
         """Return the `world_t` of trial 0 of a batch."""
         count = len(self._names)
         columns = [column[0, :count].tolist() for column in (*state[:6], *labels)]
-        cars = [
-            name + CAR.pack(*car) for name, car in zip(self._names, zip(*columns, strict=True), strict=True)
-        ]
+        cars = [name + CAR.pack(*car) for name, car in zip(self._names, zip(*columns, strict=True), strict=True)]
         return b"".join((self._world, HEAD.pack(trial, tick, time), INT.pack(count), *cars))
 
 

@@ -77,9 +77,7 @@ class Lcm:
         self._announced, self._trial = b"", NO_TRIAL
         for subscription in self._subscriptions:
             self._lcm.unsubscribe(subscription)
-        self._subscriptions = [
-            self._lcm.subscribe(connection.command(car), self._commanded(car)) for car in remote
-        ]
+        self._subscriptions = [self._lcm.subscribe(connection.command(car), self._commanded(car)) for car in remote]
         self._cars = [(connection.state(car), instance.names.index(car)) for car in remote]
 
     def announce(self, instance: Instance) -> None:
@@ -136,9 +134,7 @@ class Lcm:
         while (left := until - monotonic()) > 0.0:
             self.receive(left)
             if request.sender in senders:
-                raise TransportError(
-                    f"another session is running at {self.url}: end it, or take another --url"
-                )
+                raise TransportError(f"another session is running at {self.url}: end it, or take another --url")
 
     def _show(self, view: View) -> None:
         message = self._encoder.world(self._trial, view.tick, view.time, view.state, view.labels)

@@ -137,9 +137,7 @@ def load() -> Any:
     for kind, expected in MD5.items():
         name = kind.partition("/")[2]
         if getattr(messages, name)._md5sum != expected:
-            raise DubinsTrafficError(
-                f"the installed {kind} is not that of 2016: its md5 sum is not {expected}"
-            )
+            raise DubinsTrafficError(f"the installed {kind} is not that of 2016: its md5 sum is not {expected}")
     return messages
 
 

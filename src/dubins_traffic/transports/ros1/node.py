@@ -41,9 +41,7 @@ def join(uri: str, name: str = NAME) -> Any:
             raise TransportError("this process has been a ROS node before; rospy allows one in its life")
         return rospy
     if not answers(uri):
-        raise TransportError(
-            f"no ROS master answers at {uri}: start roscore, set ROS_MASTER_URI, or say --master"
-        )
+        raise TransportError(f"no ROS master answers at {uri}: start roscore, set ROS_MASTER_URI, or say --master")
     os.environ["ROS_MASTER_URI"] = uri
     taken = _node_at(uri, name)
     if taken is not None and answers(taken):

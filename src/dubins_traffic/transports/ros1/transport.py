@@ -83,9 +83,7 @@ class MaestroServices:
                 rospy.Service("/gazebo/pause_physics", m.Empty, partial(self._pause, True)),
                 rospy.Service("/gazebo/unpause_physics", m.Empty, partial(self._pause, False)),
             ]
-            self._placing = rospy.Subscriber(
-                "/gazebo/set_model_state", m.ModelState, self._place, queue_size=10
-            )
+            self._placing = rospy.Subscriber("/gazebo/set_model_state", m.ModelState, self._place, queue_size=10)
         if maestro is not None:
             self._services.append(rospy.Service(f"/{NAME}/mode", m.MMode, self._mode))
         self._put("/number_trials", parameters.number_trials)
@@ -254,9 +252,7 @@ class Ros1:
         """Put up the topics of the instance's cars, and listen to those that are remote."""
         with self._guarded():
             self._topics.retain(instance.names)
-            self._world = Ros1Publishers(
-                self._topics, instance, clock=self._clock, simulated=self._simulated_here
-            )
+            self._world = Ros1Publishers(self._topics, instance, clock=self._clock, simulated=self._simulated_here)
             self._services.describe(instance)
             self._listen(remote)
         self._stamps.begin()

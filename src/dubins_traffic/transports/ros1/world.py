@@ -51,9 +51,7 @@ class Topics:
     def publisher(self, topic: str, kind: Any, *, latch: bool = False) -> Any:
         """Return the publisher of `topic`."""
         if topic not in self._made:
-            self._made[topic] = self.rospy.Publisher(
-                topic, kind, queue_size=QUEUE, latch=latch, tcp_nodelay=True
-            )
+            self._made[topic] = self.rospy.Publisher(topic, kind, queue_size=QUEUE, latch=latch, tcp_nodelay=True)
         return self._made[topic]
 
     def retain(self, cars: Sequence[str]) -> None:
@@ -124,9 +122,7 @@ class Ros1Publishers:
     def _model_states(self) -> Any:
         m = self._m
         count = len(self._names)
-        return m.ModelStates(
-            list(self._names), [m.Pose() for _ in range(count)], [m.Twist() for _ in range(count)]
-        )
+        return m.ModelStates(list(self._names), [m.Pose() for _ in range(count)], [m.Twist() for _ in range(count)])
 
     def _car(self, instance: Instance, n: int, name: str) -> _Car:
         m = self._m

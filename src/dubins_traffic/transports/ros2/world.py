@@ -86,9 +86,7 @@ class Ros2Publishers:
     def _cars(self, view: View) -> list[marks.Mark]:
         body = self._problem.car.body
         poses = [tuple(float(row[0, n]) for row in view.state[:4]) for n in range(len(self._names))]
-        return [
-            mark for n, (x, y, c, s) in enumerate(poses) for mark in marks.of_car(n, body, x, y, half(c, s))
-        ]
+        return [mark for n, (x, y, c, s) in enumerate(poses) for mark in marks.of_car(n, body, x, y, half(c, s))]
 
     def _put(self, topic: str, kind: Any, make: Callable[[], Any], *, latched: bool = False) -> None:
         if topic not in self._writers:

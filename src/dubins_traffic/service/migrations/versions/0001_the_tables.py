@@ -20,8 +20,7 @@ def upgrade() -> None:
     if op.get_bind().dialect.name == "sqlite":
         for what in ("UPDATE", "DELETE"):
             op.execute(
-                f"CREATE TRIGGER act_no_{what.lower()} BEFORE {what} ON act "
-                f"BEGIN SELECT RAISE(ABORT, '{KEPT}'); END"
+                f"CREATE TRIGGER act_no_{what.lower()} BEFORE {what} ON act BEGIN SELECT RAISE(ABORT, '{KEPT}'); END"
             )
         op.execute(  # INSERT OR REPLACE deletes a row, and no trigger of DELETE is asked
             "CREATE TRIGGER act_no_replace BEFORE INSERT ON act WHEN EXISTS (SELECT 1 FROM act WHERE id = NEW.id) "
@@ -29,8 +28,7 @@ def upgrade() -> None:
         )
     else:
         op.execute(
-            "CREATE FUNCTION act_is_kept() RETURNS trigger LANGUAGE plpgsql AS "
-            f"$$BEGIN RAISE EXCEPTION '{KEPT}'; END$$"
+            f"CREATE FUNCTION act_is_kept() RETURNS trigger LANGUAGE plpgsql AS $$BEGIN RAISE EXCEPTION '{KEPT}'; END$$"
         )
         op.execute(
             "CREATE TRIGGER act_kept BEFORE UPDATE OR DELETE OR TRUNCATE ON act "
