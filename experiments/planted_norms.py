@@ -46,8 +46,8 @@ CHANGES: Final = (
     ),
     Change(
         "rules/breach_log.py",
-        "        own.judged = int(judged[b])\n",
-        f"        own.judged = int(judged[b])\n        own.hole = int(__import__('os').environ.get('{HOLE}', '0'))\n",
+        "        row.judged = int(judged[b])\n",
+        f"        row.judged = int(judged[b])\n        row.hole = int(__import__('os').environ.get('{HOLE}', '0'))\n",
     ),
     Change(
         "rules/duties.py",
@@ -83,21 +83,21 @@ CHANGES: Final = (
     Change("rules/tables.py", "    turn_back: float\n", "    turn_back: float\n    hole: int\n"),
     Change(
         "rules/tables.py",
-        "        own.turn_back = given.turn_back\n",
-        "        own.turn_back = given.turn_back\n"
-        f"        own.hole = int(__import__('os').environ.get('{HOLE}', '0'))\n",
+        "        row.turn_back = given.turn_back\n",
+        "        row.turn_back = given.turn_back\n"
+        f"        row.hole = int(__import__('os').environ.get('{HOLE}', '0'))\n",
     ),
     Change(
         "rules/location.py",
-        "min(car.top, car.held_top), own.turn_back",
-        f"(car.top if own.hole >= {FLIPS} else min(car.top, car.held_top)), own.turn_back",
+        "min(car.top, car.held_top), rules.turn_back",
+        f"(car.top if rules.hole >= {FLIPS} else min(car.top, car.held_top)), rules.turn_back",
     ),
     Change("shield/tables.py", "    turn_back: float\n", "    turn_back: float\n    hole: int\n"),
     Change(
         "shield/tables.py",
-        "        own.turn_back = rules.turn_back\n",
-        "        own.turn_back = rules.turn_back\n"
-        f"        own.hole = int(__import__('os').environ.get('{HOLE}', '0'))\n",
+        "        row.turn_back = rules.turn_back\n",
+        "        row.turn_back = rules.turn_back\n"
+        f"        row.hole = int(__import__('os').environ.get('{HOLE}', '0'))\n",
     ),
     Change(
         "shield/checks.py",
@@ -134,9 +134,9 @@ CHANGES: Final = (
     ),
     Change(
         "agents/free.py",
-        "    found = found or own.stopped_in >= 0 or bits & FLAG.LEFT != 0\n",
+        "    found = found or free_car.stopped_in >= 0 or bits & FLAG.LEFT != 0\n",
         f"    returns = bits & FLAG.LEFT != 0 and judging.rules[b].hole < {FLIPS}\n"
-        "    found = found or own.stopped_in >= 0 or returns\n",
+        "    found = found or free_car.stopped_in >= 0 or returns\n",
     ),
     Change(
         "agents/free.py",

@@ -63,8 +63,8 @@ def copy_with_rule(folder: Path, number: int) -> None:
     _edit(log, r"^    return_ticks: int\n", r"    change_ticks: int\n\g<0>")
     _edit(
         log,
-        r"^        own\.return_ticks = .*\n",
-        r"        own.change_ticks = ticks(given.change_time, rate)\n\g<0>",
+        r"^        row\.return_ticks = .*\n",
+        r"        row.change_ticks = ticks(given.change_time, rate)\n\g<0>",
     )
     _edit(own / "rules" / "parameters.py", r"^    crossing_degree: int = 3\n", f"{PARAMETER}\\g<0>")
     _edit(own / "rules" / "breaches.py", r"^@jit_inline\ndef judge_road\(", f"{LOOK}\\g<0>")

@@ -229,10 +229,10 @@ def may_come(b: int, n: int, who: int, comes: float, way: ReferencePath, traffic
 def ego_is_beside(
     b: int, here: float, back: float, way: ReferencePath, traffic: Traffic, lane: int, vehicle: Vehicle
 ) -> bool:
-    """Tell whether the ego is in the lane where car n would pass: it might stay beside n, or stop where n returns.
+    """Tell whether the ego is in the lane where car n, `here` (m) along its own, would pass.
 
-    One that stands behind n in its lane, or in the disc where that begins, does not count: until it has set off, n is
-    ahead of it on the left.
+    It might stay beside n, or stop where n returns, at `back` (m). One that stands behind n in its lane, or in the disc
+    where that begins, does not count: until it has set off, n is ahead of it on the left.
     """
     state, labels = traffic.state, traffic.labels
     if labels.segment[b, EGO] != lane >> 1:
@@ -252,8 +252,9 @@ def extent(
 ) -> tuple[float, float, float]:
     """Return (end, left, right): where what stands ahead in the lane ends, and from where to where it reaches.
 
-    Both are metres left of the middle of the lane; on the right nobody passes a car. Where ticks are long a car counts
-    as wider: so much that a gap of `BERTH` beside it is safe whatever it does in a tick, however it turns meanwhile.
+    Both are metres left of the middle of the lane, in which the car is at `here` (m); on the right nobody passes a car.
+    Where ticks are long a car counts as wider: so much that a gap of `BERTH` beside it is safe whatever it does in a
+    tick, however it turns meanwhile.
     """
     state, labels, obstacles, scratch = traffic.state, traffic.labels, traffic.obstacles, traffic.scratch
     end = here - 1.0
@@ -290,7 +291,7 @@ def extent(
 def stands_beside(
     b: int, here: float, back: float, offset: float, way: ReferencePath, obstacles: ObstacleTable, vehicle: Vehicle
 ) -> bool:  # fmt: skip
-    """Tell whether an obstacle is in the way of a car that drives `offset` left of the middle of its lane to `back`."""
+    """Tell whether an obstacle bars the way of a car from `here` (m) to `back` (m), `offset` (m) left of the middle."""
     wide = vehicle.half_width + vehicle.rounding + BESIDE
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         part = obstacles.parts[p]

@@ -42,7 +42,7 @@ def stays_right(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePat
 
 @jit
 def surely_stands(b: int, n: int, here: float, way: ReferencePath, traffic: Traffic) -> bool:
-    """Tell whether a car in the way of car n, which is `here` along its lane in the next frame, will stand then too.
+    """Tell whether a car in the way of car n, `here` (m) along its lane in the next frame, will stand then too.
 
     A standing car may drive off. It also becomes excused, and then is no reason to overtake, when a car ahead of it
     gets its place in the order of the crossing.
