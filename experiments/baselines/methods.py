@@ -56,7 +56,8 @@ METHODS: Final[Mapping[str, Method]] = {
     ),
     "gr1-tulip": Method(
         "GR(1) synthesis by TuLiP", tulip.controller,
-        "the same by TuLiP with omega and dd, from the start of each trial; gives up over 3,000 positions", "tulip",
+        "the same by TuLiP, from the start of each trial; by the rules where it has no answer; "
+        "gives up over 3,000 positions", "tulip",
     ),
     "cloning": Method(
         "cloned from `rules`", str(_LEARNED / "junction.npz"), "DAgger on `junction`, a network of 96 and 48"

@@ -1,7 +1,9 @@
 """The winning strategy that TuLiP finds for a trial, from where its cars start, if the game is small enough.
 
 TuLiP, with omega and dd, gets the specification that `dubins-traffic synth --spec game.py` writes, and what it finds
-drives as any [foreign strategy](../../../docs/foreign-strategies.md) does.
+drives as any [foreign strategy](../../../docs/foreign-strategies.md) does. Such a strategy knows the plays from one
+start, with all cars in view: where a car was out of sight and is elsewhere, the ego goes on by the rules, under the
+shield.
 """
 
 from __future__ import annotations
@@ -54,4 +56,4 @@ def controller(instance: Instance) -> str:
             env={"PYTHONHASHSEED": "0"},
         )  # fmt: skip
         found.replace(strategy)
-    return str(strategy) if strategy.stat().st_size else UNSOLVED
+    return f"{strategy}+fallback" if strategy.stat().st_size else UNSOLVED
