@@ -9,7 +9,8 @@ shield (`experiments.free_egos`) drives among `lawful` cars: in how many trials 
 rule? Each search ends after N trials, a million unless said otherwise, or S seconds, a day. Its folder below
 `build/contract` is of the package's sources; Ctrl-C keeps what is done, and the next call goes on. With --store the
 counts so far are kept as the result of the experiment, whatever the number of trials; another seed, on another machine
-or day, adds to those of the same sources. Beside them stays the greatest count of each search of earlier sources.
+or day, adds to those of the same sources. Until a search has come to a million with these, one count of earlier sources
+stays beside: the last that did, else the greatest.
 """
 
 from __future__ import annotations
@@ -147,9 +148,10 @@ def searched(name: str, trials: int, seconds: float, seed: int, workers: int) ->
 
 
 def together(counts: Iterable[Count]) -> list[Count]:
-    """Return counts with those that are stored of the same sources, and of each search the greatest of earlier ones.
+    """Return counts with those that are stored of the same sources, and of searches with few of them, of earlier ones.
 
-    They are in the order of the searches, those of these sources first.
+    They are in the order of the searches, those of later sources first. Of earlier ones the last that came to `TRIALS`
+    stays, else the greatest.
     """
     before = load("contract")
     stored = [Count(**{**count, "kinds": tuple(count["kinds"])}) for count in (before.counts if before else ())]
@@ -161,9 +163,15 @@ def together(counts: Iterable[Count]) -> list[Count]:
         for count in latest.values():
             if count.search == name:
                 by_code[count.code].append(count)
-        found += by_code.pop(sources, [])
-        found += max(by_code.values(), key=lambda own: sum(count.trials for count in own), default=[])
+        here = by_code.pop(sources, [])
+        found += here
+        if _trials(here) < TRIALS:
+            found += max(by_code.values(), key=lambda counts: min(TRIALS, _trials(counts)), default=[])
     return found
+
+
+def _trials(counts: Iterable[Count]) -> int:
+    return sum(count.trials for count in counts)
 
 
 def rows(counts: Iterable[Count]) -> list[Row]:
@@ -183,7 +191,7 @@ def _row(own: Wanted, counts: list[Count], *, earlier: bool) -> Row:
     more = f"; {discarded:,} in which somebody broke a rule before the ego did"
     bar = f"0 of {TRIALS:,}" if own.bar else ""
     met = not own.bar or (not found and trials >= TRIALS)
-    when = ", of an earlier state of the rules and drivers" if earlier else ""
+    when = ", of earlier sources" if earlier else ""
     return Row(f"{own.says}, {trials:,} searched{when}: {HAPPENS[own.target]}", told + more, bar, met)
 
 
