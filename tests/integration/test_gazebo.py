@@ -20,7 +20,7 @@ from dubins_traffic.cars.sensing import Surroundings, rays_at, scan
 from dubins_traffic.cars.tables import pack_cars, pack_obstacles
 from dubins_traffic.errors import InputError
 from dubins_traffic.gazebo import prefix
-from dubins_traffic.gazebo.link import Kind, LostError
+from dubins_traffic.gazebo.link import LostError, MessageKind
 from dubins_traffic.gazebo.server import PREFIX, Folder
 from dubins_traffic.gazebo.simulator import Gazebo
 from dubins_traffic.gazebo.world import WHEEL_RADIUS
@@ -238,15 +238,15 @@ def test_cars_can_be_placed_and_nonsense_is_refused() -> None:
     simulator.reset([scene([pose(0, 0), pose(2, 0)])])
     assert simulator.server is not None
     places = np.array([pose(1, 2, 0.5), pose(-3, 4, -2.5)])
-    placed = simulator.server.ask(Kind.PLACE, places.ravel()).reshape(2, 7)
+    placed = simulator.server.ask(MessageKind.PLACE, places.ravel()).reshape(2, 7)
     assert placed[:, :4] == pytest.approx(places, abs=1e-9)
     assert not placed[:, 4:].any()
     rate = 0.5 / WHEEL_RADIUS
-    moved = simulator.server.ask(Kind.STEP, np.array([210, rate, rate, 0.0, 0.0])).reshape(2, 7)
+    moved = simulator.server.ask(MessageKind.STEP, np.array([210, rate, rate, 0.0, 0.0])).reshape(2, 7)
     assert moved[0, :2] == pytest.approx(places[0, :2] + 0.5 * places[0, 2:], abs=0.01)
     assert moved[1, :4] == pytest.approx(places[1], abs=1e-4)
     with pytest.raises(LostError, match="refused STEP"):
-        simulator.server.ask(Kind.STEP, np.zeros(2))
+        simulator.server.ask(MessageKind.STEP, np.zeros(2))
     simulator.close()
 
 

@@ -11,7 +11,7 @@ import pytest
 import dubins_traffic as dt
 from dubins_traffic.cars.body import Disc
 from dubins_traffic.errors import InputError
-from dubins_traffic.gazebo.link import Kind
+from dubins_traffic.gazebo.link import MessageKind
 from dubins_traffic.gazebo.server import Server
 from dubins_traffic.gazebo.world import WHEEL_RADIUS, outlook, world
 from dubins_traffic.protocols import End
@@ -44,9 +44,9 @@ def test_a_world_of_roads_that_bend_is_loaded_whole() -> None:
     text = world([pose(*network.points[0])], Disc(), (), STEP, str(found.plugin), scenery)
     server = Server(found, text.replace("</plugin>", f"{listed}</plugin>"))
     try:
-        assert server.ask(Kind.HELLO).tolist()[1:3] == [1.0, len(names)]
+        assert server.ask(MessageKind.HELLO).tolist()[1:3] == [1.0, len(names)]
         rate = SPEED / WHEEL_RADIUS
-        moved = server.ask(Kind.STEP, np.array([STEPS, rate, rate]))
+        moved = server.ask(MessageKind.STEP, np.array([STEPS, rate, rate]))
         assert moved[0] - network.points[0, 0] == pytest.approx(SPEED * STEP * STEPS, abs=0.01)
     finally:
         server.close()

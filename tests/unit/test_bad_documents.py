@@ -12,7 +12,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.document import load_instance
 from dubins_traffic.problem.draw import draw
-from dubins_traffic.problem.files import Kind, detect
+from dubins_traffic.problem.files import FileKind, detect
 from dubins_traffic.problem.trial_data import TrialData
 
 Document = dict[str, Any]
@@ -341,16 +341,16 @@ def _written(folder: Path, document: Document) -> Path:
 @pytest.mark.parametrize(
     ("document", "kind"),
     [
-        ({"version": 0, "length": 1, "transform": [0, 0, 0], "shape": [2, 2]}, Kind.NETWORK),
-        ({"version": 0, "segments": [[0, 0, 0, 1]], "length": 1}, Kind.NETWORK),
-        (base(version=0), Kind.CONFIGURATION),
-        (base(), Kind.CONFIGURATION),
-        ({"version": 0, "e-agents": [], "rnd": {}}, Kind.CONFIGURATION),
-        ({"version": 0, "goals": [], "rnd": {}, "intersection_radius": 1}, Kind.INSTANCE),
-        (instance(), Kind.INSTANCE),
-        (instance(**{"e-agents": []}), Kind.INSTANCE),
-        (trial_data(), Kind.TRIAL_DATA),
+        ({"version": 0, "length": 1, "transform": [0, 0, 0], "shape": [2, 2]}, FileKind.NETWORK),
+        ({"version": 0, "segments": [[0, 0, 0, 1]], "length": 1}, FileKind.NETWORK),
+        (base(version=0), FileKind.CONFIGURATION),
+        (base(), FileKind.CONFIGURATION),
+        ({"version": 0, "e-agents": [], "rnd": {}}, FileKind.CONFIGURATION),
+        ({"version": 0, "goals": [], "rnd": {}, "intersection_radius": 1}, FileKind.INSTANCE),
+        (instance(), FileKind.INSTANCE),
+        (instance(**{"e-agents": []}), FileKind.INSTANCE),
+        (trial_data(), FileKind.TRIAL_DATA),
     ],
 )
-def test_documents_are_told_apart_by_content(document: Document, kind: Kind) -> None:
+def test_documents_are_told_apart_by_content(document: Document, kind: FileKind) -> None:
     assert detect(document) is kind

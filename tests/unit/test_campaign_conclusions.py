@@ -69,7 +69,7 @@ def kept(
     folder.mkdir(exist_ok=True)
     part = folder / "part.parquet"
     part.write_bytes(rows.encoded(rows.columns(made)))
-    table.merge(campaign, [part], table.Kind.RESULTS, folder / table.RESULTS)
+    table.merge(campaign, [part], table.TableKind.RESULTS, folder / table.RESULTS)
     manifest.write(folder, campaign, manifest.make(campaign, "none"))
     return compare_rows(campaign, table.read(folder, campaign, []))
 

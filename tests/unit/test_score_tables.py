@@ -228,7 +228,7 @@ def campaign_of(folder: Path, *found: tuple[End, Score]) -> tuple[Comparison, An
     part = folder / "part.parquet"
     part.write_bytes(rows.encoded(rows.columns(made)))
     results = table.read(folder, campaign, [part])
-    table.merge(campaign, [part], table.Kind.RESULTS, folder / table.RESULTS)
+    table.merge(campaign, [part], table.TableKind.RESULTS, folder / table.RESULTS)
     return compare(campaign, results), results
 
 

@@ -134,7 +134,7 @@ class Folder:
         """Merge the parts into the table, if that does not exist, and remove them."""
         if not self.finished:
             found = [path for _, _, path in parts(self.path)]
-            for name, kind in ((table.WALL, table.Kind.WALL), (table.RESULTS, table.Kind.RESULTS)):
+            for name, kind in ((table.WALL, table.TableKind.WALL), (table.RESULTS, table.TableKind.RESULTS)):
                 replace_file(
                     self.path / name,
                     lambda neighbour, kind=kind: table.merge(self.campaign, found, kind, neighbour),

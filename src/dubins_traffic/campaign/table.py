@@ -27,7 +27,7 @@ GROUP = 65_536
 FACTOR = "factor."
 
 
-class Kind(Enum):
+class TableKind(Enum):
     """Which of the two tables."""
 
     RESULTS = "results"
@@ -45,7 +45,7 @@ def is_part(path: Path, count: int, metrics: Sequence[Column] = ()) -> bool:
     return parquet.metadata.num_rows == count and parquet.schema_arrow.names == names
 
 
-def merge(campaign: Campaign, parts: Sequence[Path], kind: Kind, target: Path) -> None:
+def merge(campaign: Campaign, parts: Sequence[Path], kind: TableKind, target: Path) -> None:
     """Write one of the tables from its parts, given in order; holds a row group and a part in memory.
 
     Raises
@@ -69,10 +69,10 @@ def merge(campaign: Campaign, parts: Sequence[Path], kind: Kind, target: Path) -
         raise InputError("not all trials have rows", file=str(target.parent), value=count, expected=str(campaign.total))
 
 
-def read(folder: Path, campaign: Campaign, parts: Sequence[Path], kind: Kind = Kind.RESULTS) -> Any:
+def read(folder: Path, campaign: Campaign, parts: Sequence[Path], kind: TableKind = TableKind.RESULTS) -> Any:
     """Return a table of a campaign, an Arrow table; of one that is not finished the rows that there are."""
     made = rows.arrow()
-    whole = folder / (RESULTS if kind is Kind.RESULTS else WALL)
+    whole = folder / (RESULTS if kind is TableKind.RESULTS else WALL)
     try:
         if whole.is_file():
             table = made.parquet.read_table(whole)
@@ -106,7 +106,7 @@ def assumption(folder: Path) -> tuple[int, int]:
     return sum(known), len(known)
 
 
-def _groups(campaign: Campaign, parts: Sequence[Path], kind: Kind) -> Iterator[Any]:
+def _groups(campaign: Campaign, parts: Sequence[Path], kind: TableKind) -> Iterator[Any]:
     """Return the rows of `parts` in tables of `GROUP` rows, the last with what is left."""
     made = rows.arrow()
     waiting: list[Any] = []
@@ -126,10 +126,10 @@ def _load(part: Path) -> Any:
     return rows.arrow().parquet.read_table(part)
 
 
-def _schema(campaign: Campaign, kind: Kind) -> Any:
+def _schema(campaign: Campaign, kind: TableKind) -> Any:
     made = rows.arrow()
     part = rows.part_schema(campaign.columns)
-    if kind is Kind.WALL:
+    if kind is TableKind.WALL:
         return made.schema([part.field(name) for name in ("number", *rows.WALL)])
     identity = [("number", made.int64()), ("cell", made.int32()), ("configuration", made.string())]
     identity += [(FACTOR + name, _type(campaign, name)) for name in campaign.factors]
@@ -149,11 +149,11 @@ def _type(campaign: Campaign, factor: str) -> Any:
     return made.float64() if kinds <= {int, float} else made.string()
 
 
-def shaped(campaign: Campaign, part: Any, kind: Kind) -> Any:
+def shaped(campaign: Campaign, part: Any, kind: TableKind) -> Any:
     """Return rows of a part as rows of a table of a campaign: with the columns that say which trials they are."""
     made = rows.arrow()
     schema = _schema(campaign, kind)
-    if kind is Kind.WALL:
+    if kind is TableKind.WALL:
         return part.select(schema.names).cast(schema)
     cells, controllers, trials = places(campaign, part["number"].to_numpy())
     chosen_cells: list[Cell] = [campaign.cells[k] for k in cells.tolist()]

@@ -15,7 +15,7 @@ EXAMPLES = options.examples(
 )
 
 
-class Kind(StrEnum):
+class Language(StrEnum):
     """What there is a template of."""
 
     PYTHON = "python"
@@ -25,7 +25,7 @@ class Kind(StrEnum):
 
 def template(
     kind: Annotated[
-        Kind,
+        Language,
         typer.Argument(
             metavar="python|cpp|ros2",
             help="A submission in that language, or nodes in both and a launch file.",

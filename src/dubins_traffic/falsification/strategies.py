@@ -49,7 +49,7 @@ RARE: Final = 48
 
 
 @dataclass(slots=True)
-class Line:
+class Descent:
     """The best of the trials that descend from one that was drawn: its margin, genome, and how many children failed."""
 
     margin: float
@@ -75,7 +75,7 @@ class Evolution:
         self._source, self._targets = source, tuple(targets)
         count = "one" if len(self._targets) == 1 else "many"
         self._most_lines, self._patience = LINES[count], PATIENCE[count]
-        self._lines: dict[str, dict[int, Line]] = {target: {} for target in targets}
+        self._lines: dict[str, dict[int, Descent]] = {target: {} for target in targets}
         self._given_up: dict[str, set[int]] = {target: set() for target in targets}
         self._worst: dict[str, int] = {}
         """The line of a target with the largest margin, where it is known."""
@@ -175,7 +175,7 @@ class Evolution:
         if line is not None:
             nearer = margin < CLOSER * line.margin
             if margin <= line.margin:
-                lines[root] = Line(margin, genome, 0 if nearer else line.failed)
+                lines[root] = Descent(margin, genome, 0 if nearer else line.failed)
                 self._worst.pop(target, None)
             return nearer
         if len(lines) == self._most_lines:
@@ -185,7 +185,7 @@ class Evolution:
             if margin >= lines[worst].margin:
                 return False
             del lines[worst]
-        lines[root] = Line(margin, genome)
+        lines[root] = Descent(margin, genome)
         self._worst.pop(target, None)
         return True
 
@@ -211,7 +211,7 @@ class Evolution:
         """Take over what was kept."""
         for target, written in state["lines"].items():
             self._lines[target] = {
-                int(root): Line(margin, Genome.from_json(genome), failed)
+                int(root): Descent(margin, Genome.from_json(genome), failed)
                 for root, (margin, genome, failed) in written.items()
             }
         self._given_up = {target: set(roots) for target, roots in state["given_up"].items()}

@@ -20,7 +20,7 @@ from dubins_traffic.cars.body import Disc
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
 from dubins_traffic.gazebo import prefix
-from dubins_traffic.gazebo.link import Kind, LostError
+from dubins_traffic.gazebo.link import LostError, MessageKind
 from dubins_traffic.gazebo.prefix import Installation
 from dubins_traffic.gazebo.server import Server
 from dubins_traffic.gazebo.world import WHEEL_RADIUS, world
@@ -72,7 +72,7 @@ def drive_ahead(installation: Installation) -> None:
     try:
         server = Server(installation, text)
         rate = SPEED / WHEEL_RADIUS
-        x, y = server.ask(Kind.STEP, np.array([STEPS, rate, rate]))[:2].tolist()
+        x, y = server.ask(MessageKind.STEP, np.array([STEPS, rate, rate]))[:2].tolist()
     except LostError as error:
         why = str(error) if server is None else server.explain(error)
         raise InputError(f"Gazebo does not work here ({why})", file=str(installation.gzserver)) from error

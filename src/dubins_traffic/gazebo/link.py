@@ -34,7 +34,7 @@ LINGER: Final = 0.002
 """Seconds for which the socket is polled before a blocking wait; a tick of a dozen cars takes less."""
 
 
-class Kind(IntEnum):
+class MessageKind(IntEnum):
     """Kinds of messages; an answer has the kind of its question."""
 
     HELLO = 1
@@ -73,7 +73,7 @@ class Link:
         self._line.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, limit)
         self._line.setsockopt(socket.SOL_SOCKET, socket.SO_SNDTIMEO, limit)
 
-    def ask(self, kind: Kind, values: Floats) -> Floats:
+    def ask(self, kind: MessageKind, values: Floats) -> Floats:
         """Send a message and return the numbers of its answer.
 
         LostError if no answer comes within the patience, the other end has gone, or it does not know the message.
@@ -81,7 +81,7 @@ class Link:
         self.send(kind, values)
         return self.receive(kind)
 
-    def send(self, kind: Kind, values: Floats) -> None:
+    def send(self, kind: MessageKind, values: Floats) -> None:
         """Send a message; LostError if it can't be."""
         try:
             self._line.sendall(HEAD.pack(kind, len(values)) + values.tobytes())
@@ -92,7 +92,7 @@ class Link:
         """Tell whether there is data to receive, or will be within the given time."""
         return bool(select.select([self._line], [], [], seconds)[0])
 
-    def receive(self, kind: Kind) -> Floats:
+    def receive(self, kind: MessageKind) -> Floats:
         """Return the numbers of the answer to a message of this kind that has been sent; LostError as `ask`."""
         try:
             data = self._take(b"", HEAD.size)
@@ -109,7 +109,7 @@ class Link:
     def quit(self) -> None:
         """Tell the other end to end, and close this one."""
         with contextlib.suppress(OSError):
-            self._line.send(HEAD.pack(Kind.QUIT, 0), socket.MSG_DONTWAIT)
+            self._line.send(HEAD.pack(MessageKind.QUIT, 0), socket.MSG_DONTWAIT)
         self._line.close()
 
     def _look(self) -> bytes:

@@ -23,7 +23,7 @@ from typing import Final
 import numpy as np
 
 from dubins_traffic.errors import InputError
-from dubins_traffic.gazebo.link import PROTOCOL, Kind, Link, LostError
+from dubins_traffic.gazebo.link import PROTOCOL, Link, LostError, MessageKind
 from dubins_traffic.gazebo.prefix import Installation
 from dubins_traffic.kernels.arrays import Floats
 
@@ -162,9 +162,9 @@ class Server:
 
     def _greet(self, installation: Installation, port: int, startup: float) -> None:
         try:
-            self._link.send(Kind.HELLO, np.zeros(0))
+            self._link.send(MessageKind.HELLO, np.zeros(0))
             self._await(startup)
-            version = self._link.receive(Kind.HELLO)[0]
+            version = self._link.receive(MessageKind.HELLO)[0]
         except LostError as error:
             why, status = self.explain(error), self.process.poll()
             unloaded = UNLOADED in self.log.read_bytes()
@@ -215,7 +215,7 @@ class Server:
         weakref.finalize(self, _kill, client)
         self._client = client
 
-    def ask(self, kind: Kind, values: Floats | None = None) -> Floats:
+    def ask(self, kind: MessageKind, values: Floats | None = None) -> Floats:
         """Send a message to the plugin and return its answer; LostError if there is none."""
         return self._link.ask(kind, np.zeros(0) if values is None else values)
 

@@ -16,7 +16,7 @@ from dubins_traffic.cars.dynamics import require_dubins
 from dubins_traffic.cars.state import Contact, State
 from dubins_traffic.cars.tables import pack_cars
 from dubins_traffic.errors import InputError, PeerError
-from dubins_traffic.gazebo.link import BODY, CONTACT, Contacts, Kind, LostError
+from dubins_traffic.gazebo.link import BODY, CONTACT, Contacts, LostError, MessageKind
 from dubins_traffic.gazebo.prefix import find
 from dubins_traffic.gazebo.server import Server
 from dubins_traffic.gazebo.world import BUMPER, Drive, outlook, world
@@ -117,7 +117,7 @@ class Gazebo:
             if self._show:
                 self.server.show(self._installation)
                 self._began = monotonic()
-            self._take(self._ask(Kind.STATE))
+            self._take(self._ask(MessageKind.STATE))
         except LostError as error:
             self._lost = str(error)
         except PeerError as error:
@@ -135,7 +135,7 @@ class Gazebo:
         speed, yaw_rate = self._asked
         clip(self._rows, 0, commands[0], speed, yaw_rate, 0, len(speed))
         self._message[1::2], self._message[2::2] = self._drive.wheels(speed, yaw_rate)
-        answer = self._ask(Kind.STEP, self._message)
+        answer = self._ask(MessageKind.STEP, self._message)
         self._tick += 1
         if self._show:
             sleep(max(0.0, self._began + self._tick / self._rate - monotonic()))
@@ -146,7 +146,7 @@ class Gazebo:
         """Return how far the rays (R, 2), unit vectors in the frame of `car`, go: (R,), at most `longest` metres."""
         message = np.concatenate(([car, BUMPER, longest], rays.ravel()))
         try:
-            return self._ask(Kind.SCAN, message).copy()
+            return self._ask(MessageKind.SCAN, message).copy()
         except PeerError:
             if self._tick:
                 raise
@@ -167,7 +167,7 @@ class Gazebo:
         state.speed[0] = vx * c + vy * s
         return answer[BODY * cars :].reshape(-1, CONTACT)
 
-    def _ask(self, kind: Kind, values: Floats | None = None) -> Floats:
+    def _ask(self, kind: MessageKind, values: Floats | None = None) -> Floats:
         if self._lost:
             raise PeerError(End.WORLD_LOST.value, self._lost)
         if self.server is None:

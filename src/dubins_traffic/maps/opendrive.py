@@ -19,7 +19,7 @@ from dubins_traffic.maps.junctions import End, OneWay, Union, joined_where_equal
 from dubins_traffic.maps.model import Road, RoadMap
 from dubins_traffic.maps.polylines import along, cleaned
 from dubins_traffic.maps.xml_text import Reader, document, number_text, parse, place
-from dubins_traffic.roads.chains import Piece, chain
+from dubins_traffic.roads.chains import ChainPiece, chain
 from dubins_traffic.roads.formats.xml_root import root_name
 
 LANE_WIDTH = 3.5
@@ -234,7 +234,7 @@ def _road(
     _write_lanes(element, road.lane_width)
 
 
-def _plan(road: Element, pieces: tuple[Piece, ...]) -> None:
+def _plan(road: Element, pieces: tuple[ChainPiece, ...]) -> None:
     plan = SubElement(road, "planView")
     s = 0.0
     for piece in pieces:

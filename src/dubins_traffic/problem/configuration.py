@@ -17,7 +17,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.files import exists, is_file
 from dubins_traffic.kernels.angles import sincos
 from dubins_traffic.problem.faults import parse, version_of
-from dubins_traffic.problem.files import Kind, Source, plain, read_source
+from dubins_traffic.problem.files import FileKind, Source, plain, read_source
 from dubins_traffic.problem.instance import EAgent
 from dubins_traffic.problem.kinds import kind_of, parameters_of
 from dubins_traffic.problem.settings import VERSION_0_KEYS, AgentEntry, Settings, Settings0
@@ -170,7 +170,7 @@ def load_config(
         return Configuration.from_document(source, rnd=rnd)
     found = find_source(source)
     wanted = "a trials configuration", "problem_domain, rnd, e-agents, ..."
-    document = found.document(Kind.CONFIGURATION, *wanted)
+    document = found.document(FileKind.CONFIGURATION, *wanted)
     return Configuration.from_document(document, found.name, found.folder, rnd)
 
 

@@ -19,7 +19,7 @@ from dubins_traffic.problem.draw import (
     origin_start,
 )
 from dubins_traffic.problem.faults import parse, version_of
-from dubins_traffic.problem.files import Kind, plain, read_source
+from dubins_traffic.problem.files import FileKind, plain, read_source
 from dubins_traffic.problem.formulas import check_formulas
 from dubins_traffic.problem.instance import Instance, Problem
 from dubins_traffic.problem.obstructions import check_obstructions
@@ -122,7 +122,7 @@ def load_instance(source: str | os.PathLike[str], seed: int = 0, trial: int = 0)
         If there is no such file, it holds something else, or something in it is wrong.
     """
     found = read_source(source)
-    document = found.document(Kind.INSTANCE, "a problem instance", "goals, rnd, intersection_radius, ...")
+    document = found.document(FileKind.INSTANCE, "a problem instance", "goals, rnd, intersection_radius, ...")
     return instance_from_document(document, found.name, seed, trial)
 
 

@@ -22,7 +22,7 @@ DOCUMENTS = packed(".json")
 _DEEPEST = 100
 
 
-class Kind(StrEnum):
+class FileKind(StrEnum):
     """What a file may hold."""
 
     NETWORK = "network"
@@ -40,7 +40,7 @@ class Source:
     folder: Path | None
     text: str
 
-    def document(self, kind: Kind, wanted: str, keys: str) -> dict[str, Any]:
+    def document(self, kind: FileKind, wanted: str, keys: str) -> dict[str, Any]:
         """Return the JSON object in the text; InputError unless it is of a `kind`, `wanted` in words, with `keys`."""
         document = parse_json(self.text, self.name)
         found = detect(document, self.name)
@@ -164,7 +164,7 @@ def write_document(document: Mapping[str, Any], path: str | os.PathLike[str], *,
     write_text(os.fspath(path), dumps(document))
 
 
-def detect(document: Mapping[str, Any], file: str | None = None) -> Kind:
+def detect(document: Mapping[str, Any], file: str | None = None) -> FileKind:
     """Return the kind of a JSON document, told by its keys.
 
     Raises
@@ -174,17 +174,17 @@ def detect(document: Mapping[str, Any], file: str | None = None) -> Kind:
     """
     keys = document.keys()
     if keys & {"trialconf", "instances"}:
-        return Kind.TRIAL_DATA
+        return FileKind.TRIAL_DATA
     if "problem_domain" in keys:
-        return Kind.CONFIGURATION
+        return FileKind.CONFIGURATION
     if "starts" in keys or (keys >= {"goals", "rnd"} and not keys & _CONFIGURATION_ONLY):
-        return Kind.INSTANCE
+        return FileKind.INSTANCE
     if keys & (_CONFIGURATION_ONLY | {"e-agents"}):
-        return Kind.CONFIGURATION
+        return FileKind.CONFIGURATION
     if "goals" in keys:
-        return Kind.INSTANCE
+        return FileKind.INSTANCE
     if keys & {"segments", "shape", "length", "transform"}:
-        return Kind.NETWORK
+        return FileKind.NETWORK
     raise InputError(
         "unknown kind of document",
         file=file,

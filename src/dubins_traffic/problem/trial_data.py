@@ -13,7 +13,7 @@ from dubins_traffic.errors import InputError
 from dubins_traffic.problem.configuration import Configuration, plan_agents, settings_of
 from dubins_traffic.problem.document import instance_from_document, instance_to_document
 from dubins_traffic.problem.faults import Open, parse
-from dubins_traffic.problem.files import Kind, plain, read_source, write_document
+from dubins_traffic.problem.files import FileKind, plain, read_source, write_document
 from dubins_traffic.problem.instance import Instance
 
 DATE_FORMAT = "%Y-%m-%d %H:%M:%S"
@@ -89,7 +89,7 @@ class TrialData(Open):
             If there is no such file, it holds something else, or something in it is wrong.
         """
         found = read_source(source)
-        document = found.document(Kind.TRIAL_DATA, "trial data", "version, date, trialconf, instances")
+        document = found.document(FileKind.TRIAL_DATA, "trial data", "version, date, trialconf, instances")
         return TrialData.from_document(document, found.name)
 
     def to_document(self) -> dict[str, Any]:

@@ -41,7 +41,7 @@ class Entry(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Piece:
+class WholeChunk:
     """A whole chunk: its number from 0, the bytes of the file that it takes, and its messages in their order."""
 
     number: int
@@ -68,7 +68,7 @@ def is_finished(data: bytes) -> bool:
     return data[at : at + _HEAD.size] == _HEAD.pack(Opcode.FOOTER, _FOOTER.size - _HEAD.size)
 
 
-def pieces(data: bytes, file: str | None = None) -> Iterator[Piece]:
+def pieces(data: bytes, file: str | None = None) -> Iterator[WholeChunk]:
     """Yield the whole chunks of a record's file, in order.
 
     Raises
@@ -95,7 +95,7 @@ def pieces(data: bytes, file: str | None = None) -> Iterator[Piece]:
             if footer is not None:
                 raise torn from None
             continue  # the last chunk of a file that was cut off may be torn; any other may not
-        yield Piece(len(spans) - 1, first, end, messages)
+        yield WholeChunk(len(spans) - 1, first, end, messages)
     if footer is not None and footer.spans != tuple(spans):
         raise _damaged(file, None, "the index at its end names other chunks than there are")
 

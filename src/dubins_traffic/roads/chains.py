@@ -33,7 +33,7 @@ FINEST = 64
 """An arc is never drawn with more chords."""
 
 
-class Piece(NamedTuple):
+class ChainPiece(NamedTuple):
     """A line or an arc of a chain, in the units of its polygon.
 
     Attributes
@@ -73,7 +73,7 @@ class _Bow(NamedTuple):
     cosine: float
 
 
-def chain(start: Point, corners: Sequence[Corner], end: Point) -> tuple[Piece, ...]:
+def chain(start: Point, corners: Sequence[Corner], end: Point) -> tuple[ChainPiece, ...]:
     """Return the pieces of the polygon from `start` over the `corners` to `end`.
 
     Raises
@@ -85,7 +85,7 @@ def chain(start: Point, corners: Sequence[Corner], end: Point) -> tuple[Piece, .
     points = [start, *((x, y) for x, y, _ in corners), end]
     sides = [_side(k, p, q) for k, (p, q) in enumerate(pairwise(points))]
     bows = [_bow(k, corner[2], *sides[k][:2], *sides[k + 1][:2]) for k, corner in enumerate(corners)]
-    pieces: list[Piece] = []
+    pieces: list[ChainPiece] = []
     for k, (ux, uy, length) in enumerate(sides):
         before = bows[k - 1].tangent if k else 0.0
         after = bows[k].tangent if k < len(bows) else 0.0
@@ -96,7 +96,7 @@ def chain(start: Point, corners: Sequence[Corner], end: Point) -> tuple[Piece, .
         (x0, y0), (x1, y1) = points[k], points[k + 1]
         x0, y0, x1, y1 = x0 + before * ux, y0 + before * uy, x1 - after * ux, y1 - after * uy
         if left > TIGHT * length:
-            pieces.append(Piece(x0, y0, ux, uy, left, 0.0, 0.0, 0.0, 0.0, x1, y1, ux, uy))
+            pieces.append(ChainPiece(x0, y0, ux, uy, left, 0.0, 0.0, 0.0, 0.0, x1, y1, ux, uy))
         if after > 0.0:
             vx, vy = sides[k + 1][:2]
             corner = points[k + 1]
@@ -124,11 +124,11 @@ def _bow(k: int, radius: float, ux: float, uy: float, vx: float, vy: float) -> _
     return _Bow(radius * abs(sine) / (1.0 + cosine), sine, cosine)
 
 
-def _arc(start: Point, u: Point, stop: Point, v: Point, radius: float, bow: _Bow) -> Piece:
+def _arc(start: Point, u: Point, stop: Point, v: Point, radius: float, bow: _Bow) -> ChainPiece:
     side = 1.0 if bow.sine > 0.0 else -1.0
     cx, cy = start[0] - side * radius * u[1], start[1] + side * radius * u[0]
     length = radius * angle(abs(bow.sine), bow.cosine)
-    return Piece(*start, *u, length, cx, cy, radius, side, *stop, *v)
+    return ChainPiece(*start, *u, length, cx, cy, radius, side, *stop, *v)
 
 
 def _overlap(k: int, count: int, needed: float, length: float) -> InputError:
@@ -198,7 +198,7 @@ class Chains:
         self.first: Ints = np.concatenate([[0], np.cumsum([len(pieces) for pieces in given])]).astype(np.int64)
         self.owner: Ints = np.repeat(np.arange(len(given)), np.diff(self.first))
         rows = np.array([piece for pieces in given for piece in pieces], dtype=np.float64)
-        rows = rows.reshape(-1, len(Piece._fields))
+        rows = rows.reshape(-1, len(ChainPiece._fields))
         tx, ty, theta = transform
         turn, shift = sincos(theta), np.array([tx, ty])
         self.start = turned(unit * rows[:, 0:2], *turn) + shift
@@ -278,9 +278,9 @@ class Chains:
         return max(1, min(FINEST, ceil(self.length[k] / sqrt(8.0 * self.radius[k] * sagitta))))
 
 
-def pieces(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> list[tuple[Piece, ...]]:
+def pieces(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> list[tuple[ChainPiece, ...]]:
     """Return the pieces of each segment that bends, none for the others; an InputError names segment and corner."""
-    found: list[tuple[Piece, ...]] = []
+    found: list[tuple[ChainPiece, ...]] = []
     for s, (x0, y0, x1, y1) in enumerate(segments):
         bends = corners[s] if corners else ()
         try:

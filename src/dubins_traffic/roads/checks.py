@@ -13,7 +13,7 @@ import numpy as np
 
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Ints
-from dubins_traffic.roads.chains import Corners, Piece, Point, Segment, chain, pieces
+from dubins_traffic.roads.chains import ChainPiece, Corners, Point, Segment, chain, pieces
 from dubins_traffic.roads.closeness import finder
 from dubins_traffic.roads.cover import covered, pairs
 from dubins_traffic.roads.formats.rnd import extent
@@ -150,13 +150,13 @@ def first_crossing(segments: Sequence[Segment], corners: Sequence[Corners]) -> t
     return min(found, key=lambda pair: (pair[1], pair[0]), default=None)
 
 
-def _follow(row: Sequence[Piece]) -> bool:
+def _follow(row: Sequence[ChainPiece]) -> bool:
     """Whether the last of some pieces of a chain begins where the first one ends, but for what rounding may leave."""
     between = sum(piece.length for piece in row[1:-1])
     return between <= 4.0 * NEAR * (row[0].length + row[-1].length)
 
 
-def _candidates(rows: Sequence[Piece]) -> Iterator[tuple[int, int]]:
+def _candidates(rows: Sequence[ChainPiece]) -> Iterator[tuple[int, int]]:
     """Yield the pairs of pieces that are near each other, each once."""
     boxes = [_box(piece) for piece in rows]
     spans = np.array([(x0, y0, x1, y1) for x0, y0, x1, y1 in boxes])
@@ -176,7 +176,7 @@ def _candidates(rows: Sequence[Piece]) -> Iterator[tuple[int, int]]:
     yield from sorted(seen)
 
 
-def _bulge(piece: Piece) -> float:
+def _bulge(piece: ChainPiece) -> float:
     """Return how far an arc leaves its chord."""
     if piece.side == 0.0:
         return 0.0
@@ -184,7 +184,7 @@ def _bulge(piece: Piece) -> float:
     return piece.radius * (1.0 - cosine)
 
 
-def _box(piece: Piece) -> tuple[float, float, float, float]:
+def _box(piece: ChainPiece) -> tuple[float, float, float, float]:
     """Return a box about a piece."""
     grown = _bulge(piece)
     return (
@@ -195,7 +195,7 @@ def _box(piece: Piece) -> tuple[float, float, float, float]:
     )
 
 
-def _pieces_meet(p: Piece, q: Piece, common: frozenset[Point]) -> bool:
+def _pieces_meet(p: ChainPiece, q: ChainPiece, common: frozenset[Point]) -> bool:
     """Whether two pieces share a point other than the `common` ends of their segments."""
     near = NEAR * (p.length + q.length)
     ends = [(p.x, p.y), (p.end_x, p.end_y), (q.x, q.y), (q.end_x, q.end_y)]
@@ -207,7 +207,7 @@ def _pieces_meet(p: Piece, q: Piece, common: frozenset[Point]) -> bool:
     return False
 
 
-def _intersections(p: Piece, q: Piece) -> list[Point]:
+def _intersections(p: ChainPiece, q: ChainPiece) -> list[Point]:
     """Return the points in which the lines or circles of two pieces cross; none where they are parallel or apart."""
     if p.side != 0.0 and q.side != 0.0:
         return _of_circles(p, q)
@@ -222,7 +222,7 @@ def _intersections(p: Piece, q: Piece) -> list[Point]:
     return [(p.x + along * p.tx, p.y + along * p.ty)]
 
 
-def _of_circle(x: float, y: float, tx: float, ty: float, arc: Piece) -> list[Point]:
+def _of_circle(x: float, y: float, tx: float, ty: float, arc: ChainPiece) -> list[Point]:
     """Return where the line through (x, y) with direction (tx, ty) crosses the circle of an arc."""
     along = (arc.cx - x) * tx + (arc.cy - y) * ty
     off = tx * (arc.cy - y) - ty * (arc.cx - x)
@@ -233,7 +233,7 @@ def _of_circle(x: float, y: float, tx: float, ty: float, arc: Piece) -> list[Poi
     return [(x + s * tx, y + s * ty) for s in (along - half, along + half)]
 
 
-def _of_circles(p: Piece, q: Piece) -> list[Point]:
+def _of_circles(p: ChainPiece, q: ChainPiece) -> list[Point]:
     dx, dy = q.cx - p.cx, q.cy - p.cy
     apart = sqrt(dx * dx + dy * dy)
     if apart <= NEAR * (p.radius + q.radius):
@@ -243,7 +243,7 @@ def _of_circles(p: Piece, q: Piece) -> list[Point]:
     return _of_circle(x, y, -dy / apart, dx / apart, p)
 
 
-def _covers(piece: Piece, x: float, y: float, near: float) -> bool:
+def _covers(piece: ChainPiece, x: float, y: float, near: float) -> bool:
     """Whether a point lies on a piece, its ends included."""
     if piece.side == 0.0:
         rx, ry = x - piece.x, y - piece.y

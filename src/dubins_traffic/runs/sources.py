@@ -13,7 +13,7 @@ from dubins_traffic.problem.document import instance_from_document
 from dubins_traffic.problem.files import (
     MCAP_MAGIC,
     STANDARD_INPUT,
-    Kind,
+    FileKind,
     detect,
     is_record,
     parse_json,
@@ -112,11 +112,11 @@ def _load(
             raise
         return RoadNetwork.from_text(found.text, found.name, other)
     match kind:
-        case Kind.NETWORK:
+        case FileKind.NETWORK:
             return RoadNetwork.from_document(document, found.name)
-        case Kind.CONFIGURATION:
+        case FileKind.CONFIGURATION:
             return Configuration.from_document(document, found.name, found.folder, rnd)
-        case Kind.INSTANCE:
+        case FileKind.INSTANCE:
             return instance_from_document(document, found.name, seed)
         case _:
             raise InputError(f"holds {kind}", file=found.name, expected=KINDS)

@@ -115,7 +115,7 @@ def save_trials(suite: Suite, campaign: Campaign, folder: Path) -> Path:
     """Write the results of a finished campaign beside its table, with the seconds in a file of their own."""
     known = manifest.read(folder) or {}
     results_table = table.read(folder, campaign, [])
-    clock = table.read(folder, campaign, [], table.Kind.WALL)
+    clock = table.read(folder, campaign, [], table.TableKind.WALL)
     entries: list[dict[str, Any]] = []
     seconds: dict[str, dict[str, Any]] = {}
     for k, name in enumerate(campaign.controllers):
@@ -362,8 +362,8 @@ def compare_trials(suite: Suite, sources: Sequence[Source]) -> tuple[Comparison,
     parts = [_part(campaign, k, one) for k, one in enumerate(named)]
     whole = rows.arrow().concat_tables(parts).sort_by("number")
     timed = any(source.wall is not None for source in sources)
-    clock = table.shaped(campaign, whole, table.Kind.WALL) if timed else None
-    results = table.shaped(campaign, whole, table.Kind.RESULTS)
+    clock = table.shaped(campaign, whole, table.TableKind.WALL) if timed else None
+    results = table.shaped(campaign, whole, table.TableKind.RESULTS)
     return compare(campaign, results, clock), _made(suite, named)
 
 

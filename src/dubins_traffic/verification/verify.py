@@ -24,7 +24,7 @@ from dubins_traffic.problem.files import parse_json
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.problem.kinds import REMOTE
 from dubins_traffic.record import header, reader, schema
-from dubins_traffic.record.chunks import Entry, Piece, is_finished, pieces
+from dubins_traffic.record.chunks import Entry, WholeChunk, is_finished, pieces
 from dubins_traffic.record.reader import Record
 from dubins_traffic.record.writer import RecordEncoder
 from dubins_traffic.scoring.score import score
@@ -66,7 +66,7 @@ def written_difference(data: bytes, head: bytes, record: Record) -> Difference |
     return Difference(f"byte {at} of the file", difference, wanted)
 
 
-def _piece_difference(recorded: Piece | None, made: Piece | None) -> Difference | None:
+def _piece_difference(recorded: WholeChunk | None, made: WholeChunk | None) -> Difference | None:
     if recorded is None or made is None:
         number = recorded.number if recorded is not None else made.number if made is not None else 0
         given, wanted = ("a chunk" if piece is not None else None for piece in (recorded, made))

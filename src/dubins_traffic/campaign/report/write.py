@@ -213,7 +213,7 @@ def write_report(
     distributions()
     place, known, campaign, results = open_campaign(folder)
     parts = [path for _, _, path in folders.parts(place)]
-    clock = table.read(place, campaign, parts, table.Kind.WALL) if wall else None
+    clock = table.read(place, campaign, parts, table.TableKind.WALL) if wall else None
     comparison = compare(campaign, results, clock)
     target = place / REPORT if output is None else Path(output)
     make_folder(target, "a report")
