@@ -20,6 +20,7 @@ from benchmarks.batch import configuration
 from benchmarks.table import Row
 from dubins_traffic.engine.batch import outcomes
 from dubins_traffic.engine.group import Group
+from dubins_traffic.envs.crew import agent_name
 from dubins_traffic.envs.episodes import Episodes
 from dubins_traffic.envs.parallel_vector import TrafficParallelVectorEnv
 from dubins_traffic.envs.vector import TrafficVectorEnv
@@ -61,35 +62,46 @@ def measure() -> list[Row]:
             "",
             True,
         ),
-        _several(document),
+        *_several(document),
         *_towns(),
         Row("a reset, of all environments at once", f"{1e3 * reset:.3f} ms", "<= 0.2 ms", reset <= 2e-4),
         _against(highway.what, cars * ticks / every, highway.per_second, 2000.0, "car-steps/s"),
     ]
 
 
-def _several(document: dict[str, Any]) -> Row:
-    """Return the row that compares the steps of learners that drive all cars with those of one."""
-    rates: list[list[float]] = [[], []]
-    makers = (lambda: TrafficVectorEnv(ENVS, document), (ENVS, 2)), (
-        lambda: TrafficParallelVectorEnv(ENVS, document), (ENVS, AGENTS + 1, 2)
-    )  # fmt: skip
+def _several(document: dict[str, Any]) -> list[Row]:
+    """Return the rows that compare the steps of learners that drive all cars with those of one, and under shields."""
+    all_cars: Any = {agent_name(car): "sure" for car in range(AGENTS + 1)}
+    shape, rates = (ENVS, AGENTS + 1, 2), list[list[float]]([[], [], []])
+    makers = (
+        (lambda: TrafficVectorEnv(ENVS, document), (ENVS, 2)),
+        (lambda: TrafficParallelVectorEnv(ENVS, document), shape),
+        (lambda: TrafficParallelVectorEnv(ENVS, document, shields=all_cars), shape),
+    )
     for _ in range(ROUNDS):
-        for found, (make, shape) in zip(rates, makers, strict=True):
-            env, actions = make(), np.random.default_rng(1).uniform(0.0, 1.0, shape)
+        for found, (make, size) in zip(rates, makers, strict=True):
+            env, actions = make(), np.random.default_rng(1).uniform(0.0, 1.0, size)
             env.reset(seed=1)
             env.step(actions)
             began = process_time()
             for _ in range(STEPS):
                 env.step(actions)
-            found.append(float(np.prod(shape[:-1])) * STEPS / (process_time() - began))
-    one, every = map(max, rates)
-    return Row(
-        f"{AGENTS + 1} learners in each, steps of all of them",
-        f"{every:.2e} steps/s = {every / one:.2f} of those of one",
-        ">= 0.4 of those of one",
-        every / one >= 0.4,
-    )
+            found.append(float(np.prod(size[:-1])) * STEPS / (process_time() - began))
+    one, every, shielded = map(max, rates)
+    return [
+        Row(
+            f"{AGENTS + 1} learners in each, steps of all of them",
+            f"{every:.2e} steps/s = {every / one:.2f} of those of one",
+            ">= 0.4 of those of one",
+            every / one >= 0.4,
+        ),
+        Row(
+            "the same, each under a shield",
+            f"{shielded:.2e} steps/s = {shielded / every:.2f} of those without",
+            "",
+            True,
+        ),
+    ]
 
 
 def _towns() -> list[Row]:
