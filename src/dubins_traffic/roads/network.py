@@ -323,12 +323,7 @@ class RoadNetwork(Pictured):
 
     @cached_property
     def _arms(self) -> list[tuple[int, ...]]:
-        return arms(self._sides, self.ends, len(self.intersections))
-
-    @cached_property
-    def _sides(self) -> list[Segment]:
-        """The first and the last side (dx, dy) of each segment's polygon, in the lattice's frame."""
-        return sides(self.segments, self.corners)
+        return arms(sides(self.segments, self.corners), self.ends, len(self.intersections))
 
     def arms(self, v: int) -> tuple[int, ...]:
         """Return the lanes out of an intersection, counter-clockwise by bearing there from the lattice's x axis."""

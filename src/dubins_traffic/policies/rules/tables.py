@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import compress
 from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
@@ -320,7 +319,8 @@ def vehicles_of(problems: Sequence[Problem], disturbed: Sequence[bool] = ()) -> 
     first, alike = distinct([(number, id(problem.network)) for number, problem in zip(index, problems, strict=True)])
     least = np.array([least_speed(problems[k]) for k in first])
     rows["dawdle"] = np.maximum(DAWDLE, least)[alike]
-    for row, problem in compress(zip(rows, problems, strict=True), disturbed):
+    for k in np.flatnonzero(disturbed).tolist():
+        row, problem = rows[k], problems[k]
         row.late, row.unsure, row.blur = problem.command_delay, problem.unsure, problem.blur
         row.over -= row.unsure
         row.near = near_of(problem.car, problem.period * (1.0 + row.late)) + 2.0 * row.unsure
