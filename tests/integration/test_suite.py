@@ -14,6 +14,7 @@ from typing import Any
 import pytest
 
 from dubins_traffic.suites.suite import load_suite
+from tests.boxes import needs_boxes
 from tests.campaigns import COMMAND
 from tests.suites import cases, document, games, written
 
@@ -150,6 +151,7 @@ class Mine:
 """A controller that drives in a box, and gives up elsewhere."""
 
 
+@needs_boxes
 @pytest.mark.parametrize("kind", ["trials", "cases"])
 def test_a_controller_that_is_not_ours_runs_in_a_box_and_the_results_say_so(kind: str, tmp_path: Path) -> None:
     file = written(tmp_path / "suite.json", document() if kind == "trials" else cases())
