@@ -59,6 +59,8 @@ class Search(Tables):
 
 def joined(graphs: Sequence[LaneTables]) -> tuple[LaneTables, list[int], list[int]]:
     """Return several graphs as one, and the numbers in it of the first lane and the first intersection of each."""
+    if len(graphs) == 1:
+        return graphs[0], [0, len(graphs[0].into)], [0, len(graphs[0].into_off) - 1]
     lanes, places, steps = (
         [0, *accumulate(len(array) for array in arrays)]
         for arrays in zip(*((graph.into, graph.into_off[1:], graph.after) for graph in graphs), strict=True)

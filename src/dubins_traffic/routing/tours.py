@@ -19,14 +19,7 @@ import numpy as np
 
 from dubins_traffic.kernels.arrays import Floats, Ints
 from dubins_traffic.kernels.calls import bound
-from dubins_traffic.routing.round_search import (
-    ARMS,
-    LaneTables,
-    joined,
-    metres_into,
-    room,
-    shortest_round,
-)
+from dubins_traffic.routing.round_search import LaneTables, joined, metres_into, room, shortest_round
 
 if TYPE_CHECKING:
     from dubins_traffic.roads.network import RoadNetwork
@@ -65,7 +58,7 @@ class LaneGraph:
         count, end = network.lanes, network.ends[:, ::-1].ravel()
         follows = [network.successors(lane) for lane in range(count)]
         length = np.repeat(network.lengths, 2)
-        lane = np.repeat(np.arange(count), [len(follow) for follow in follows])
+        lane = np.repeat(np.arange(count), [len(lanes) for lanes in follows])
         other = np.fromiter(chain.from_iterable(follows), dtype=np.int64)
         turn: Floats | float = 0.0
         if turn_cost is not None:
@@ -233,7 +226,7 @@ def _find_shortest(number: int, wanted: Sequence[tuple[LaneGraph, tuple[int, ...
         found = Round(tuple((search_room.lane[:count] - lane).tolist()), tuple(search_room.arrival.tolist()), length)
         distance = far[search_room.row, lane : lane + graph.count] + np.array(graph.length)
         graph.rounds[goals] = found
-        graph.stages[found] = np.array(goals, dtype=np.int64)[search_room.row // ARMS], distance
+        graph.stages[found] = np.array(goals, dtype=np.int64)[search_room.row // search_room.far.shape[1]], distance
 
 
 def _nearest_first(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
