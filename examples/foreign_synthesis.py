@@ -29,13 +29,14 @@ SQUARE = {
 }
 """Four roads round a square; the ego is to go to two opposite corners again and again."""
 
-SOLVE = """
+LOST = "the ego can't win"
+SOLVE = f"""
 import runpy, sys
 from tulip import dumpsmach, synth
 game, strategy = sys.argv[1:]
 machine = synth.synthesize(runpy.run_path(game)["specification"], solver="omega")
 if machine is None:
-    sys.exit("the ego can't win")
+    sys.exit("{LOST}")
 dumpsmach.write_python_case(strategy, machine)
 print(len(machine), "states")
 """

@@ -13,6 +13,8 @@ import subprocess
 from pathlib import Path
 from typing import Final
 
+from examples.foreign_synthesis import LOST, SOLVE
+
 from dubins_traffic.errors import InputError
 from dubins_traffic.files import write_text
 from dubins_traffic.problem.instance import Instance
@@ -25,16 +27,6 @@ FOLDER: Final = ROOT / "build" / "gr1"
 MOST: Final = 3_000
 """Positions of the largest game that TuLiP is asked about: it takes ten seconds for them."""
 UNSOLVED: Final = "experiments.baselines.gr1.controller:GivesUp"
-SOLVE: Final = """
-import runpy, sys
-from tulip import dumpsmach, synth
-game, strategy = sys.argv[1:]
-machine = synth.synthesize(runpy.run_path(game)["specification"], solver="omega")
-if machine is None:
-    open(strategy, "w").close()
-else:
-    dumpsmach.write_python_case(strategy, machine)
-"""
 
 
 def controller(instance: Instance) -> str:
@@ -51,9 +43,11 @@ def controller(instance: Instance) -> str:
         FOLDER.mkdir(parents=True, exist_ok=True)
         game, found = (strategy.with_suffix(ending) for ending in (".game.py", ".found.py"))
         write_text(game, text)
-        subprocess.run(
-            [str(PYTHON), "-c", SOLVE, str(game), str(found)], check=True, capture_output=True,
-            env={"PYTHONHASHSEED": "0"},
-        )  # fmt: skip
+        words = [str(PYTHON), "-c", SOLVE, str(game), str(found)]
+        done = subprocess.run(words, check=False, capture_output=True, text=True, env={"PYTHONHASHSEED": "0"})
+        if done.returncode and not done.stderr.rstrip().endswith(LOST):
+            raise RuntimeError(f"TuLiP: {done.stderr}")
+        if done.returncode:
+            write_text(found, "")
         found.replace(strategy)
     return f"{strategy}+fallback" if strategy.stat().st_size else UNSOLVED
