@@ -252,10 +252,10 @@ class Search:
         """Count the trials of a generation, and tell the strategy of them."""
         places = {id(instance.problem.network): instance for instance in instances}
         self._expected.update(cell.number for cell in possible(places.values()))
-        for number, genome, tried_one in zip(numbers, genomes, tried, strict=True):
-            self._least.take(number, genome, tried_one)
-            self.counts.take_fault(number, tried_one.fault)
-            self._strategy.tell(number, genome, tried_one, self._count(tried_one))
+        for number, genome, outcome in zip(numbers, genomes, tried, strict=True):
+            self._least.take(number, genome, outcome)
+            self.counts.take_fault(number, outcome.fault)
+            self._strategy.tell(number, genome, outcome, self._count(outcome))
         self.counts.trials += len(numbers)
 
     def _count(self, tried: Tried) -> bool:
@@ -280,8 +280,8 @@ class Search:
         """Judge the failures of new kinds afresh; return those that stand with their trials, and how many don't."""
         fresh: dict[str, tuple[int, Case]] = {}
         unconfirmed = 0
-        for number, instance, tried_one in zip(numbers, instances, tried, strict=True):
-            for cell in self._wanted(tried_one):
+        for number, instance, outcome in zip(numbers, instances, tried, strict=True):
+            for cell in self._wanted(outcome):
                 if cell.name in self.archive.cases or cell.name in fresh:
                     continue
                 case = case_in(instance, cell, self._crew.make, self._crew.name)

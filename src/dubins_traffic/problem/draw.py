@@ -131,8 +131,8 @@ class Recipe:
         self._obstacles = settings.obstacle_values
         self._laser = settings.laser
         self._disturbances = settings.disturbances
-        self._names = ("ego", *(plan.agent.name for plan in configuration.agents))
         self._agents = tuple([plan.agent for plan in configuration.agents])
+        self._names = ("ego", *(agent.name for agent in self._agents))
         self._steady = not any(map(drawn_cycle, self._agents))
         self._network = configuration.network
         self._site: Site | None = None

@@ -248,7 +248,7 @@ def bend_some(
         named = {int(fault.field[len("segments[") : -1]) for fault in faults if fault.field}
         if not any(corners[s] for s in named):
             break
-        corners = [() if s in named else corner for s, corner in enumerate(corners)]
+        corners = [() if s in named else bends for s, bends in enumerate(corners)]
     return network
 
 

@@ -201,7 +201,7 @@ class RoadNetwork(Pictured):
         rows, columns = self.shape
         segments, points = len(self.segments), len(self.intersections)
         found = f"{count(segments, 'segment')}, {count(points, 'intersection')}"
-        bent = sum(1 for corner in self.corners if corner)
+        bent = sum(1 for bends in self.corners if bends)
         if self.on_lattice:
             place = f"on a {rows} x {columns} lattice"
         else:
@@ -385,7 +385,7 @@ class RoadNetwork(Pictured):
             ends=self.ends.copy(),
             vert_off=np.array([0, len(self.points)]),
             vertex=self._vertex_rows(),
-            arms=np.array([arm + (-1,) * (LARGEST_DEGREE - len(arm)) for arm in self._arms]),
+            arms=np.array([lanes + (-1,) * (LARGEST_DEGREE - len(lanes)) for lanes in self._arms]),
             degree=self.degrees.copy(),
             grid=table(CellGrid, 1),
             **dict.fromkeys(("seg_start", "seg_item", "vert_start", "vert_item", "pave"), none),
@@ -498,7 +498,7 @@ class RoadNetwork(Pictured):
     @cached_property
     def bent(self) -> npt.NDArray[np.bool_]:
         """Whether each segment bends, (S,)."""
-        return _fixed(np.array([bool(corner) for corner in self.corners] or [False] * len(self.segments)))
+        return _fixed(np.array([bool(bends) for bends in self.corners] or [False] * len(self.segments)))
 
     @cached_property
     def tangents(self) -> Floats:
