@@ -111,7 +111,7 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
             if leans(vehicle):
                 edge = min(edge, vehicle.middle - vehicle.over)
             offset = min(offset, edge - clear)
-        elif one_is_ego(j, n) and leans_past(b, j, left, px, py, traffic.drivers.car[b, n], traffic):
+        elif one_is_ego(j, n) and leans_past(b, n, j, left, px, py, traffic.drivers.car[b, n], traffic):
             if left >= 0.0:
                 offset = min(offset, left - half - clear)
             elif part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:

@@ -170,7 +170,8 @@ def look_ahead(
             continue
         if left > ASTRAY and its_left > wide and comes_past(way, x, y, dx, dy, wide):
             continue
-        if one_is_ego(j, n) and leans_past(b, j, its_left, px, py, car, traffic):
+        beside = one_is_ego(j, n) or its_left > vehicle.middle
+        if beside and leans_past(b, n, j, its_left, px, py, car, traffic):
             continue
         passed = car.aside > 0.0 and labels.bits[b, j] & FLAG.STANDS != 0
         if passed and its_left < car.aside - wide + SIDE:
@@ -206,14 +207,18 @@ def comes_past(way: ReferencePath, x: float, y: float, dx: float, dy: float, wid
 
 
 @jit_rare
-def leans_past(b: int, j: int, left: float, px: float, py: float, car: Driver, traffic: Traffic) -> bool:
-    """Tell whether a car gets past car `j` in a disc, `left` (m) of the middle of its way, by leaning, as it will.
+def leans_past(b: int, n: int, j: int, left: float, px: float, py: float, car: Driver, traffic: Traffic) -> bool:
+    """Tell whether car `n` gets past car `j` in a disc, `left` (m) of the middle of its way, by leaning, as it will.
 
-    One of them is the ego. The way has the direction (`px`, `py`) there.
+    The way has the direction (`px`, `py`) there. Two e-agents do so in bends and dead ends, where a tick is long.
     """
     vehicle = traffic.drivers.vehicle[b]
     if car.aside != 0.0 or traffic.labels.lane[b, j] >= 0:
         return False
+    if not one_is_ego(j, n):
+        first, disc = int(traffic.roads.vert_off[traffic.drivers.net[b]]), int(traffic.labels.crosses[b, j])
+        if not leans(vehicle) or disc < 0 or int(traffic.roads.degree[first + disc]) >= vehicle.degree:
+            return False
     kept = half_across(b, j, px, py, traffic.state, vehicle) + kept_beside(vehicle)
     if left < 0.0:
         return left + kept <= farthest_left(vehicle)

@@ -85,14 +85,15 @@ def move(
         speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
     safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     # A car that turns in place to where it may not drive would turn back in the next tick, and so on for ever.
-    if safe and speed == 0.0 and vehicle.tightest == 0.0 and (passes or steep == ABRUPT or offset < 0.0):
+    strays = offset < 0.0 or abs(left) > SLIGHT
+    if safe and speed == 0.0 and vehicle.tightest == 0.0 and (passes or steep == ABRUPT or strays):
         safe = leads_on(b, n, Line(left - offset, px, py, allowed), steep, near, trusted, traffic)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
     if returns and (near > 0 or allowed < CREEPS) and vehicle.tightest == 0.0:
         motion = Motion(speed, yaw_rate, safe)
         speed, yaw_rate, safe = come_back(b, n, motion, Line(left, px, py, allowed), way, near, traffic)
     if not safe and offset == 0.0 and (passes or returns or abs(left) > SLIGHT):
-        if returns or (outside and left > SLIGHT):
+        if returns or (outside and left > max(SLIGHT, vehicle.middle - vehicle.reach)):
             allowed = min(allowed, room_to_return(b, n, way, traffic) / vehicle.period)
         speed, yaw_rate = steer(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
