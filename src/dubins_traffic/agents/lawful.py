@@ -224,6 +224,7 @@ def _add_stages(
     Trial b has the cars of fleets[whose[b]], which are described by cars[b].
     """
     numbers: list[int] = whose.tolist()
+    begin, end = cars["first"], cars["last"]
     goals: list[tuple[int, int]] = []
     for b, (problem, number) in enumerate(zip(problems, numbers, strict=True)):
         fleet, first = fleets[number], len(stage)
@@ -231,9 +232,9 @@ def _add_stages(
             stage += dict.fromkeys(problem.goal_vertices)
         goals.append((first, len(stage)))
         for n, cycle in fleet.loops:
-            cars[b, n].first = len(stage)
+            begin[b, n] = len(stage)
             stage += cycle_lanes(problem.network, cycle)
-            cars[b, n].last = len(stage)
+            end[b, n] = len(stage)
     spans = np.array(goals, dtype=np.int64)
     for number, fleet in enumerate(fleets):
         trials = np.flatnonzero(whose == number)[:, None]

@@ -51,7 +51,7 @@ from dubins_traffic.rules.fault import with_fault_by
 from dubins_traffic.rules.judged import distinct_problems
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.rules.parameters import RuleParameters
-from dubins_traffic.rules.referee import Breach, accused, breach_of, order, pending_of, terms_of
+from dubins_traffic.rules.referee import Breach, accused, breaches_of, order, pending_of, terms_of
 from dubins_traffic.rules.tables import LabelTables, spread
 from dubins_traffic.scoring.findings import Findings
 from dubins_traffic.scoring.margins import EgoMargins, margin_rules
@@ -339,10 +339,10 @@ class Group:
         world = self._world
         drivers, labels = world.drivers, world.labels
         world.progress.trial["lawful"] = drivers.active
-        for b in np.flatnonzero(drivers.car["kind"][:, EGO] == KIND.ROUND).tolist():
-            car = drivers.car[b, EGO]
+        kind, first, last, place = (drivers.car[name][:, EGO] for name in ("kind", "first", "last", "place"))
+        for b in np.flatnonzero(kind == KIND.ROUND).tolist():
             lane, segment = int(labels.lane[b, EGO]), int(labels.segment[b, EGO])
-            car.place = nearest_stage(drivers.distance, int(car.first), int(car.last), lane, segment)
+            place[b] = nearest_stage(drivers.distance, int(first[b]), int(last[b]), lane, segment)
 
     def _run(self, active: Ints, most: int) -> None:
         """Step trials by up to `most` ticks; tick by tick if there are metrics that see every frame."""
@@ -403,12 +403,18 @@ class Group:
                 self._buffer.touch([contact], b)
             pair = ((contact.car, note.sensed), (contact.other, note.other_sensed))
             self._seen[b].update((car, note.tick) for car, is_seen in pair if is_seen)
-        for k, breached in enumerate(world.breach_log.found()):
-            place, b = world.progress.place[k], int(breached.trial)
-            self.breaches[b].append(breach := breach_of(breached, place.x, place.y))
-            if place.sensed:
+        world.work.found[0] = 0
+        if not world.breach_log.filled[0]:
+            return
+        rows = world.breach_log.found()
+        place = world.progress.place[: len(rows)]
+        trials: list[int] = rows["trial"].tolist()
+        breaches, seen = breaches_of(rows, place["x"], place["y"]), place["sensed"].tolist()
+        for b, breach, sensed in zip(trials, breaches, seen, strict=True):
+            self.breaches[b].append(breach)
+            if sensed:
                 self._seen[b].add((breach.car, breach.tick))
-        world.work.found[0] = world.breach_log.filled[0] = 0
+        world.breach_log.filled[0] = 0
 
 
 def _forked(world: World, trials: Ints, seeds: npt.NDArray[np.uint64] | None, dt: float) -> World:

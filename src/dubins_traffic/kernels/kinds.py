@@ -100,12 +100,17 @@ class _Hashed(tuple[Any, ...]):
         return self.number
 
 
+_KINDS: dict[_Hashed, _Hashed] = {}
+"""The kinds of tables met so far: equal ones are one object, of which the garbage collector has to look at few."""
+
+
 def _kind_of_tables(tables: Tables) -> Kind:
     known = vars(tables)
     kind = known.get("_kind")
     if kind is None:
         fields = tuple((name, kind_of(value)) for name, value in zip(tables.field_names, tables, strict=True))
-        kind = known["_kind"] = _Hashed(("tables", type(tables).__name__, fields))
+        kind = _Hashed(("tables", type(tables).__name__, fields))
+        kind = known["_kind"] = _KINDS.setdefault(kind, kind)
     return kind
 
 

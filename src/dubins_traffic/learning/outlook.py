@@ -202,16 +202,17 @@ def _goals(problems: Sequence[Problem], trial: Rows[Outlook]) -> tuple[Rows[Soug
     """Return the goals of the trials, and the distances to them; fill in which goals are whose in `trial`."""
     known: dict[int, tuple[RoadNetwork, dict[int, int]]] = {}
     rows: list[tuple[int, int]] = []
+    begins = [0]
     count = 0
-    for b, problem in enumerate(problems):
-        trial[b].first_goal = len(rows)
+    for problem in problems:
         _, ways = known.setdefault(id(problem.network), (problem.network, {}))
         for vertex in dict.fromkeys(problem.goal_vertices):
             if vertex not in ways:
                 ways[vertex] = count
                 count += 1
             rows.append((vertex, ways[vertex]))
-        trial[b].last_goal = len(rows)
+        begins.append(len(rows))
+    trial["first_goal"], trial["last_goal"] = begins[:-1], begins[1:]
     goal = table(SoughtGoal, len(rows))
     goal["vertex"], goal["route"] = [vertex for vertex, _ in rows], [way for _, way in rows]
     metres = np.full((count, max(network.lanes for network, _ in known.values())), np.inf)

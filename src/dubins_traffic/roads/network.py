@@ -63,7 +63,7 @@ class Routes:
         return path
 
 
-def arms(sides: Sequence[Segment], ends: Ints, count: int) -> list[tuple[int, ...]]:
+def arms(sides: Sequence[Segment], ends: Ints, count: int) -> tuple[tuple[int, ...], ...]:
     """Return the lanes out of each of `count` intersections, counter-clockwise by bearing from the lattice's x axis.
 
     `sides` are the vectors (dx, dy, dx, dy) along each segment where it begins and where it ends.
@@ -72,7 +72,7 @@ def arms(sides: Sequence[Segment], ends: Ints, count: int) -> list[tuple[int, ..
     for s, (ax, ay, bx, by) in enumerate(sides):
         out[int(ends[s, 0])].append((ax, ay, 2 * s))
         out[int(ends[s, 1])].append((-bx, -by, 2 * s + 1))
-    return [tuple(lane for _, _, lane in sorted(lanes, key=cmp_to_key(_turn))) for lanes in out]
+    return tuple([tuple([lane for _, _, lane in sorted(lanes, key=cmp_to_key(_turn))]) for lanes in out])
 
 
 def _turn(p: tuple[float, float, int], q: tuple[float, float, int]) -> int:
@@ -322,7 +322,7 @@ class RoadNetwork(Pictured):
         return 2 * len(self.segments)
 
     @cached_property
-    def _arms(self) -> list[tuple[int, ...]]:
+    def _arms(self) -> tuple[tuple[int, ...], ...]:
         return arms(sides(self.segments, self.corners), self.ends, len(self.intersections))
 
     def arms(self, v: int) -> tuple[int, ...]:
@@ -334,9 +334,9 @@ class RoadNetwork(Pictured):
         return self._successors[lane]
 
     @cached_property
-    def _successors(self) -> list[tuple[int, ...]]:
+    def _successors(self) -> tuple[tuple[int, ...], ...]:
         out = [self._arms[v] for v in self.ends[:, ::-1].ravel().tolist()]
-        return [tuple([other for other in lanes if other != k ^ 1]) or (k ^ 1,) for k, lanes in enumerate(out)]
+        return tuple([tuple([o for o in lanes if o != k ^ 1]) or (k ^ 1,) for k, lanes in enumerate(out)])
 
     @cached_property
     def _lane_graph(self) -> tuple[list[int], list[float], list[list[int]]]:
@@ -479,8 +479,8 @@ class RoadNetwork(Pictured):
         return _fixed(np.array(self._end_pairs, dtype=np.int64))
 
     @cached_property
-    def _end_pairs(self) -> list[tuple[int, int]]:
-        return [(self._numbers[x0, y0], self._numbers[x1, y1]) for x0, y0, x1, y1 in self.segments]
+    def _end_pairs(self) -> tuple[tuple[int, int], ...]:
+        return tuple([(self._numbers[x0, y0], self._numbers[x1, y1]) for x0, y0, x1, y1 in self.segments])
 
     @cached_property
     def _steps(self) -> Floats:

@@ -71,8 +71,8 @@ class LaneGraph:
             *(_offsets(end, len(network.intersections)), into),
         )
         self.count = count
-        self.length: list[float] = length.tolist()
-        self.end: list[int] = end.tolist()
+        self.length: tuple[float, ...] = tuple(length.tolist())
+        self.end: tuple[int, ...] = tuple(end.tolist())
         self.rounds: dict[tuple[int, ...], Round | None] = {}
         self.stages: dict[Round, tuple[Ints, Floats]] = {}
 

@@ -252,9 +252,9 @@ class BreachLog(Tables):
         trials, cars = self.car.shape
         return MOST * trials * cars + len(self.goal)
 
-    def found(self) -> list[FoundBreach]:
+    def found(self) -> Rows[FoundBreach]:
         """Return the breaches found; they are overwritten when the next frame is judged."""
-        return [self.row[k] for k in range(int(self.filled[0]))]
+        return self.row[: int(self.filled[0])]
 
 
 class RefereeTables(Tables):

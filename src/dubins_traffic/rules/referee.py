@@ -16,7 +16,7 @@ import numpy.typing as npt
 from dubins_traffic.cars.near import unknown_spacing
 from dubins_traffic.cars.state import EGO, NONE, Contact, Frames, State
 from dubins_traffic.cars.tables import pack_cars
-from dubins_traffic.kernels.arrays import Bits, Ints
+from dubins_traffic.kernels.arrays import Bits, Floats, Ints
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.records import Grid, Rows
 from dubins_traffic.rules.breach_log import (
@@ -218,10 +218,12 @@ class Referee:
         if not self._log.filled[0] and not any(contacts):
             return [()] * len(self._judged)
         by_trial: dict[int, list[Breach]] = {}
-        for row in self._log.found():
-            b, n = int(row.trial), int(row.car)
-            by_trial.setdefault(b, []).append(breach_of(row, float(state.x[b, n]), float(state.y[b, n])))
-        self._log.filled[0] = 0
+        if self._log.filled[0]:
+            rows = self._log.found()
+            place = rows["trial"], rows["car"]
+            for b, breach in zip(place[0].tolist(), breaches_of(rows, state.x[place], state.y[place]), strict=True):
+                by_trial.setdefault(b, []).append(breach)
+            self._log.filled[0] = 0
         for b, touched in enumerate(contacts):
             if touched and self._judged[b]:
                 by_trial.setdefault(b, []).extend(accused(touched))
@@ -253,9 +255,9 @@ class Referee:
         done = 0
         while done < len(frames):
             done = judge_frames(frames.first, done, room, poses, bits, labelling, judging)
-            for row in self._log.found():
-                f, n = int(row.tick) - frames.first, int(row.car)
-                breaches.append(breach_of(row, float(frames.x[f, n]), float(frames.y[f, n])))
+            rows = self._log.found()
+            place = rows["tick"] - frames.first, rows["car"]
+            breaches += breaches_of(rows, frames.x[place], frames.y[place])
             self._log.filled[0] = 0
         return before, bits, breaches
 
@@ -313,10 +315,12 @@ def _named(runs: Sequence[bool]) -> frozenset[str]:
     return frozenset(rule for (rule, _), run in zip(PENDING, runs, strict=True) if run)
 
 
-def breach_of(row: FoundBreach, x: float, y: float) -> Breach:
-    """Return a row of the log as a Breach by a car at (x, y)."""
-    car, tick, since = int(row.car), int(row.tick), int(row.since)
-    return Breach(RULES[row.rule], car, tick, since, x, y, int(row.vertex), int(row.lane))
+def breaches_of(rows: Rows[FoundBreach], x: Floats, y: Floats) -> list[Breach]:
+    """Return rows of the log (K,) as breaches by cars whose centres are `x` (K,) and `y` (K,), metres."""
+    numbers: list[int] = rows["rule"].tolist()
+    car, tick, since, vertex, lane = (rows[name].tolist() for name in ("car", "tick", "since", "vertex", "lane"))
+    found = zip(numbers, car, tick, since, x.tolist(), y.tolist(), vertex, lane, strict=True)
+    return [Breach(RULES[rule], *about) for rule, *about in found]
 
 
 def accused(contacts: Sequence[Contact]) -> list[Breach]:
