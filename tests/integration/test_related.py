@@ -21,8 +21,9 @@ from dubins_traffic.synthesis.instance import cells_of
 from dubins_traffic.synthesis.related import Relation, relate
 from dubins_traffic.synthesis.road_play import NOWHERE, Ground
 
-FREE, LAWFUL, SOLVED = 3, 1, 13
-"""Trials of `experiments.related` among cars that do what they like, among lawful ones, and with `synthesized`."""
+FREE, LAWFUL, SOLVED, TURNED = 3, 1, 13, 663
+"""Trials of `experiments.related` among cars that do what they like, among lawful ones, and with `synthesized`; and one
+in which a car that does what it likes turns round in a bend."""
 
 
 def driven(own: Instance, path: Path, controller: str = "rules") -> tuple[Record, Score]:
@@ -43,6 +44,14 @@ def test_a_trial_without_a_breach_is_a_play_of_the_game(number: int, tmp_path: P
     assert one.relation.unknown is None
     assert one.relation.moves > 30
     assert 1.0 < one.relation.longest_move < 15.0
+
+
+def test_a_trial_in_which_a_car_turns_round_in_a_bend_is_counted_apart(tmp_path: Path) -> None:
+    one = found(TURNED, str(tmp_path))
+    assert not one.relation.related
+    assert one.turned
+    assert not one.strays
+    assert not found(FREE, str(tmp_path)).turned
 
 
 def test_a_move_that_the_game_does_not_know_is_the_breach_of_a_rule(tmp_path: Path) -> None:
