@@ -9,7 +9,7 @@ WORKERS ?= 4
 LCM := scripts/lcm_messages.py src/dubins_traffic/transports/lcm/dubins_traffic_lcm.lcm
 SETUP := pyproject.toml constraints.txt setup.py scripts/setup.sh $(LCM)
 
-.PHONY: help setup demo test test-tools kernels tools test-all golden docs results release check format schemas proofs bench clean
+.PHONY: help setup demo test test-tools kernels tools test-all golden docs results experiments release check format schemas proofs bench clean
 
 help: ## show this text
 	@grep -E '^[a-z-]+:.*## ' $(MAKEFILE_LIST) | sed -E 's/^([a-z-]+):.*## /\1\t/' | expand -t 12
@@ -71,6 +71,9 @@ docs: .venv/.installed-dev ## the site of the documentation, in build/site; warn
 
 results: .venv/.installed-dev ## run the shipped suites with the built-in controllers; the site shows what is in website/results: an hour
 	$(BIN)/python website/results.py
+
+experiments: tools kernels ## every experiment and every baseline again, stored, and their pages: days
+	@scripts/experiments.sh
 
 release: .venv/.installed-dev ## wheel and source distribution in dist/, each tried in an environment of its own for every Python here
 	@scripts/release.sh

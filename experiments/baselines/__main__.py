@@ -1,6 +1,6 @@
 """Measures methods on suites, writes the record of one trial, or writes the page.
 
-python -m experiments.baselines [METHOD...] [--suites NAME,...] [--failures] [--page]
+python -m experiments.baselines [METHOD...|--all] [--suites NAME,...] [--failures] [--page]
 python -m experiments.baselines METHOD [--shield] --record SUITE K FILE
 """
 
@@ -18,6 +18,7 @@ def main() -> int:
     """Measure the named methods, and write the page."""
     parser = argparse.ArgumentParser(prog="experiments.baselines")
     parser.add_argument("methods", nargs="*", metavar="METHOD", choices=[*METHODS, []], help=", ".join(METHODS))
+    parser.add_argument("--all", action="store_true", help="every method")
     parser.add_argument("--suites", default=",".join(SUITES), metavar="NAME,...")
     parser.add_argument("--record", nargs=3, metavar=("SUITE", "K", "FILE"), help="trial K of those that are run")
     parser.add_argument("--shield", action="store_true", help="under the shield")
@@ -32,7 +33,7 @@ def main() -> int:
         result = run_trial(instance, load(spec), name=spec, record=file)
         print(result.score.summary)
         return 0
-    for method in asked.methods:
+    for method in METHODS if asked.all else asked.methods:
         measure(method, asked.suites.split(","))
     if asked.failures:
         from experiments.baselines.failures import find

@@ -42,6 +42,10 @@ FOOT: Final = """\
 of a method says what it assumes and pins what it needs.
 `python -m experiments.baselines orca --record rules-2026 4 it.mcap` writes the record of trial 4, and with `--shield`
 that of the same under the shield, to be judged and [replayed](watch.md) as any other.
+
+`make experiments` repeats all of it, with the learning of the cloned policy and of PPO, and before it every
+[experiment](experiments.md): days on two processors, nearly all of them the searches of `falsify` and `contract`
+(`python -m experiments` says how long each takes).
 """
 
 
