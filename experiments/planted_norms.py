@@ -134,9 +134,9 @@ CHANGES: Final = (
     ),
     Change(
         "agents/free.py",
-        "    found = found or free_car.stopped_in >= 0 or bits & FLAG.LEFT != 0\n",
+        "    owes = owes or free_car.stopped_in >= 0 or bits & FLAG.LEFT != 0\n",
         f"    returns = bits & FLAG.LEFT != 0 and judging.rules[b].hole < {FLIPS}\n"
-        "    found = found or free_car.stopped_in >= 0 or returns\n",
+        "    owes = owes or free_car.stopped_in >= 0 or returns\n",
     ),
     Change(
         "agents/free.py",

@@ -256,8 +256,8 @@ def _parts(registry: str) -> Mapping[str, Callable[[], Any]]:
 
 def _part(place: str) -> Any:
     module, _, name = place.partition(":")
-    found = import_module(f"{__name__}.{module}")
-    return getattr(found, name) if name else found
+    part = import_module(f"{__name__}.{module}")
+    return getattr(part, name) if name else part
 
 
 ABOVE.html_of, ABOVE.rows_of, ABOVE.compiled = _html_of, _rows_of, _compiled

@@ -166,7 +166,7 @@ def in_python(text: str) -> str:
     >>> in_python("--keep, --records: exists; -F overwrites")
     'keep, records: exists; overwrite_data=True overwrites'
     """
-    return _OPTION.sub(lambda found: _ARGUMENTS[found[0]], text)
+    return _OPTION.sub(lambda match: _ARGUMENTS[match[0]], text)
 
 
 def shown(text: str, limit: int | None = None) -> str:

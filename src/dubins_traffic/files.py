@@ -126,12 +126,12 @@ def unpacked(data: bytes, name: str) -> bytes:
         return data
     try:
         with gzip.GzipFile(fileobj=io.BytesIO(data)) as packed:
-            found = packed.read(MOST_BYTES + 1)
+            content = packed.read(MOST_BYTES + 1)
     except (OSError, EOFError, zlib.error) as error:
         raise InputError(f"not what gzip packs ({error})", file=name, expected="a whole file") from None
-    if len(found) > MOST_BYTES:
+    if len(content) > MOST_BYTES:
         raise InputError("unpacks to too much", file=name, expected=f"at most {MOST_BYTES >> 20} MiB")
-    return found
+    return content
 
 
 def write_text(path: str | Path, text: str, *, durable: bool = False) -> None:

@@ -92,8 +92,8 @@ def resolved(spec: str, folder: Path | None = None) -> str:
     if not (colon and path.endswith(".py")):
         return spec
     beside = (folder or Path()) / Path(path).expanduser()
-    found = beside if is_file(beside) else Path(path).expanduser()
-    return f"{found.resolve()}:{name}"
+    place = beside if is_file(beside) else Path(path).expanduser()
+    return f"{place.resolve()}:{name}"
 
 
 def find(spec: str, seam: Seam) -> Callable[[], Any]:
@@ -110,12 +110,12 @@ def find(spec: str, seam: Seam) -> Callable[[], Any]:
     place, _, name = spec.rpartition(":")
     with put_back():
         module = _load_file(place, spec, seam) if place.endswith(".py") else _load_module(place, spec, seam)
-    found = getattr(module, name, None)
-    if found is None:
+    made = getattr(module, name, None)
+    if made is None:
         raise seam.refuse(f"no class {name} in {place}", spec, _offer(module, seam))
-    if not callable(found):
+    if not callable(made):
         raise seam.refuse(f"{name} in {place} is not a class", spec, CLASS)
-    return found
+    return made
 
 
 def of_packages(group: str) -> dict[str, Callable[[], Any]]:
@@ -191,14 +191,14 @@ def _load_file(place: str, spec: str, seam: Seam) -> ModuleType:
     path = path.resolve()
     kind = re.sub(r"\W", "_", seam.name)
     label = f"_{kind}_{path.stem}_{zlib.crc32(str(path).encode()):x}"
-    found = importlib.util.spec_from_file_location(label, path)
-    if found is None or found.loader is None:
+    module_spec = importlib.util.spec_from_file_location(label, path)
+    if module_spec is None or module_spec.loader is None:
         raise seam.refuse(f"not a Python file: {place}", spec, "path/to/file.py:Class")
-    module = importlib.util.module_from_spec(found)
+    module = importlib.util.module_from_spec(module_spec)
     sys.modules[label] = module
     _look_in(str(path.parent))
     try:
-        found.loader.exec_module(module)
+        module_spec.loader.exec_module(module)
     except KeyboardInterrupt:
         raise
     except BaseException as error:
@@ -234,9 +234,9 @@ def _look_in(folder: str) -> None:
 
 def _offer(module: ModuleType, seam: Seam) -> str:
     members: dict[str, Any] = vars(module)
-    found = sorted(
+    classes = sorted(
         name
         for name, value in members.items()
         if isinstance(value, type) and callable(getattr(value, seam.methods[-1], None))
     )
-    return f"one of {', '.join(found)}" if found else f"a class with the methods {' and '.join(seam.methods)}"
+    return f"one of {', '.join(classes)}" if classes else f"a class with the methods {' and '.join(seam.methods)}"

@@ -81,9 +81,9 @@ def _resolved(folder: Path, head: str) -> str | None:
         if (place / name).is_file():
             return (place / name).read_text(encoding="ascii").strip()
         packed = place / "packed-refs"
-        found = packed.is_file() and re.search(
+        match = packed.is_file() and re.search(
             rf"^([0-9a-f]{{40,64}}) {re.escape(name)}$", packed.read_text(encoding="utf-8"), re.MULTILINE
         )
-        if found:
-            return str(found[1])
+        if match:
+            return str(match[1])
     return None

@@ -288,17 +288,17 @@ def _owes(b: int, n: int, tick: int, free_car: FreeCar, judging: RefereeTables) 
     elif free_car.stopped_in != lane:
         free_car.stopped_in = -1
     run = tick - car.exit_since - car.exit_paused if car.exit_since >= 0 else 0
-    found = labels.crosses[b, n] >= 0 and car.exit_spent + run >= free_car.stay
-    found = found or min(tick - car.journey_since, free_car.start) + car.journey_spent >= free_car.journey
-    found = found or free_car.stopped_in >= 0 or bits & FLAG.LEFT != 0
+    owes = labels.crosses[b, n] >= 0 and car.exit_spent + run >= free_car.stay
+    owes = owes or min(tick - car.journey_since, free_car.start) + car.journey_spent >= free_car.journey
+    owes = owes or free_car.stopped_in >= 0 or bits & FLAG.LEFT != 0
     for g in range(terms.goals_begin, terms.goals_end):
         goal = log.goal[g]
-        found = found or labels.at[b, n] == goal.vertex
+        owes = owes or labels.at[b, n] == goal.vertex
         if 0 <= goal.since <= tick - free_car.crowded:
             corner = judging.roads.vertex[int(judging.roads.vert_off[judging.rules[b].net]) + goal.vertex]
             dx, dy = judging.state.x[b, n] - corner.x, judging.state.y[b, n] - corner.y
-            found = found or dx * dx + dy * dy < free_car.near * free_car.near
-    return found
+            owes = owes or dx * dx + dy * dy < free_car.near * free_car.near
+    return owes
 
 
 @jit
@@ -331,18 +331,18 @@ def free_tables(instances: Sequence[Instance], cars: int, roads: RoadTable, net:
 
     `net` (B,) are the numbers of the trials' networks in `roads`.
     """
-    found = [
+    places = [
         (b, n)
         for b, instance in enumerate(instances)
         for n, agent in enumerate(instance.e_agents, start=1)
         if agent.kind == FREE
     ]
     row = np.full((len(instances), cars), -1)
-    for f, place in enumerate(found):
+    for f, place in enumerate(places):
         row[place] = f
-    free_instances = [instances[b] for b, _ in found] or list(instances[:1])
+    free_instances = [instances[b] for b, _ in places] or list(instances[:1])
     problems = [instance.problem for instance in free_instances]
-    nets = np.array([net[b] for b, _ in found] or [net[0]])
+    nets = np.array([net[b] for b, _ in places] or [net[0]])
     bodies = pack_obstacles([problem.obstacles for problem in problems])
     shielded = table(Driver, (len(free_instances), cars))
     shielded["kind"][:, EGO] = KIND.ROUND
@@ -356,7 +356,7 @@ def free_tables(instances: Sequence[Instance], cars: int, roads: RoadTable, net:
         scratch(cars, int(np.diff(roads.seg_off).max()), bodies),
     )
     rows, whims = table(FreeCar, len(free_instances)), list[tuple[float, ...]]()
-    for f, (b, n) in enumerate(found):
+    for f, (b, n) in enumerate(places):
         _describe(instances[b], instances[b].e_agents[n - 1], rows[f], whims)
     given = table(Whim, len(whims))
     for name, values in zip(("end", "share", "speed", "yaw_rate", "hold"), zip(*whims, strict=True), strict=False):

@@ -118,14 +118,14 @@ def pack_drivers(
 
 def _add_choices(tables: Sequence[Mapping[int, Floats]], drivers: Rows[Driver]) -> Rows[Leg]:
     """Return the choices of all cars of all trials as one table; fill in which rows are whose."""
-    found: list[Floats] = [empty(0)]
+    chosen: list[Floats] = [empty(0)]
     first = 0
     for b, choices in enumerate(tables):
         for n, rows in choices.items():
             drivers[b, n].choice = first
             first += len(rows)
-            found.append(rows)
-    legs = np.concatenate(found)
+            chosen.append(rows)
+    legs = np.concatenate(chosen)
     rows = table(Leg, len(legs))
     if len(legs):
         numbers(rows, np.float64)[:] = legs

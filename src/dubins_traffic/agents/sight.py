@@ -90,15 +90,15 @@ def look(scene: Scene, b: int) -> int:
     team = scene.agents.team[b]
     agents = scene.agents.agent
     span = team.span
-    found = candidates(b, span, span, state, obstacles, work.search)
-    if found > work.search.pair.shape[0]:
-        return found
+    seen = candidates(b, span, span, state, obstacles, work.search)
+    if seen > work.search.pair.shape[0]:
+        return seen
     for n in range(state.count[b]):
         work.held[n] = 0
     p = team.half_length
     q = team.half_width
     r = team.rounding
-    for k in range(found):
+    for k in range(seen):
         i = work.search.pair[k].one
         j = work.search.pair[k].other
         pose = Pose(state.x[b, i], state.y[b, i], state.c[b, i], state.s[b, i])
@@ -112,4 +112,4 @@ def look(scene: Scene, b: int) -> int:
                 work.held[i] |= consider(pose, team, agents[b, i], box)
             i, j = j, i
             pose, other = other, pose
-    return found
+    return seen

@@ -263,9 +263,9 @@ def _require_within(field: str, value: float, least: float, most: float) -> None
 
 def _all_marks(record: Record, verdict: Verdict | None) -> Floats:
     """Return contacts and breaches as rows of x, y, kind and the second in which they came, in order."""
-    found = [(one.x, one.y, MARKS.CONTACT, one.time) for one in record.frames.contacts]
+    marks = [(one.x, one.y, MARKS.CONTACT, one.time) for one in record.frames.contacts]
     names = record.instance.names
     for one in () if verdict is None else verdict.violations:
         kind = MARKS.OWN if one.car == names[EGO] else MARKS.OTHERS
-        found.append((one.where.x, one.where.y, kind, one.time))
-    return np.array(sorted(found, key=lambda mark: mark[3]), dtype=np.float64).reshape(-1, 4)
+        marks.append((one.where.x, one.where.y, kind, one.time))
+    return np.array(sorted(marks, key=lambda mark: mark[3]), dtype=np.float64).reshape(-1, 4)

@@ -101,11 +101,11 @@ class _Answers(BaseHTTPRequestHandler):
             elif not number.isdigit():
                 self._answer(404, "text/plain", b"there is the page / and no other\n")
             else:
-                found = self._view.newer(int(number))
-                if found is None:
+                newer = self._view.newer(int(number))
+                if newer is None:
                     self._answer(204, "image/png", b"")
                 else:
-                    self._answer(200, "image/png", found[1], found[0])
+                    self._answer(200, "image/png", newer[1], newer[0])
 
     def _answer(self, status: int, kind: str, body: bytes, number: int = 0) -> None:
         self.send_response(status)

@@ -102,14 +102,14 @@ class Campaign:
             configurations = [configuration_of(entry, k, folder) for k, entry in enumerate(model.configurations)]
             check_names([entry.name for entry in model.configurations], "configurations")
             check_names([bare_name(spec) for spec in model.controllers], "controllers")
-            found = places or tuple(_place(spec, k, folder) for k, spec in enumerate(model.controllers))
+            named = places or tuple(_place(spec, k, folder) for k, spec in enumerate(model.controllers))
             if places is None:
-                model = model.model_copy(update={"metrics": list(scores.with_share(model.metrics, found))})
+                model = model.model_copy(update={"metrics": list(scores.with_share(model.metrics, named))})
             further = metrics or _metrics(model.metrics, folder)
             cells = tuple(_cells(model, configurations))
         except InputError as error:
             raise error.within(file=file) from None
-        return Campaign(_complete(model, configurations), model, found, cells, *further, file)
+        return Campaign(_complete(model, configurations), model, named, cells, *further, file)
 
     @property
     def controllers(self) -> tuple[str, ...]:

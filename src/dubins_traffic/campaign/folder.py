@@ -117,13 +117,13 @@ class Folder:
         """
         if self.finished:
             return [(0, self.campaign.total)]
-        found: list[tuple[int, int]] = []
+        spans: list[tuple[int, int]] = []
         for first, end, path in parts(self.path):
             if table.is_part(path, end - first, self.campaign.columns):
-                found.append((first, end))
+                spans.append((first, end))
             else:
                 path.unlink()
-        return found
+        return spans
 
     def keep(self, chunk: Chunk, part: bytes) -> None:
         """Store the part of a chunk that has been run; once this returns, the part survives a loss of power."""
@@ -133,11 +133,11 @@ class Folder:
     def finish(self) -> None:
         """Merge the parts into the table, if that does not exist, and remove them."""
         if not self.finished:
-            found = [path for _, _, path in parts(self.path)]
+            paths = [path for _, _, path in parts(self.path)]
             for name, kind in ((table.WALL, table.TableKind.WALL), (table.RESULTS, table.TableKind.RESULTS)):
                 replace_file(
                     self.path / name,
-                    lambda neighbour, kind=kind: table.merge(self.campaign, found, kind, neighbour),
+                    lambda neighbour, kind=kind: table.merge(self.campaign, paths, kind, neighbour),
                     durable=True,
                 )
         for _, _, path in parts(self.path):
@@ -147,8 +147,8 @@ class Folder:
 def parts(folder: Path) -> list[tuple[int, int, Path]]:
     """Return the parts in a campaign's folder, as (first trial, after the last, path), in order."""
     place = folder / PARTS
-    found = sorted(place.iterdir()) if place.is_dir() else []
-    matches = ((_PART.fullmatch(path.name), path) for path in found)
+    entries = sorted(place.iterdir()) if place.is_dir() else []
+    matches = ((_PART.fullmatch(path.name), path) for path in entries)
     return [(int(match[1]), int(match[2]) + 1, path) for match, path in matches if match]
 
 

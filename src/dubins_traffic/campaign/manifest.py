@@ -98,11 +98,11 @@ def make(campaign: Campaign, records: str) -> dict[str, Any]:
 
 def _versions() -> dict[str, str]:
     """Return the versions of the libraries that are installed; machine code is there without Numba, too."""
-    found: dict[str, str] = {}
+    versions: dict[str, str] = {}
     for name in LIBRARIES:
         with suppress(PackageNotFoundError):
-            found[name] = version(name)
-    return found
+            versions[name] = version(name)
+    return versions
 
 
 def write(folder: Path, campaign: Campaign, manifest: Mapping[str, Any]) -> None:
@@ -169,9 +169,9 @@ def check_same(folder: Path, campaign: Campaign, records: str | None) -> dict[st
         Which records are kept; None: as before.
     """
     manifest = read(folder) or {}
-    found = _difference(stored_document(folder), campaign.document, "")
-    if found is not None:
-        raise _changed(campaign.file, found[0], found[2], found[1])
+    difference = _difference(stored_document(folder), campaign.document, "")
+    if difference is not None:
+        raise _changed(campaign.file, difference[0], difference[2], difference[1])
     now = make(campaign, records or manifest["records"])
     for what in ("controllers", "metrics"):
         there = manifest.get(what, [])
@@ -201,9 +201,9 @@ def _difference(before: Any, now: Any, path: str) -> tuple[str, Any, Any] | None
         old, new = cast("Mapping[str, Any]", before), cast("Mapping[str, Any]", now)
         for key in dict.fromkeys([*old, *new]):
             below = f"{path}.{key}" if path else key
-            found = _difference(old.get(key, _ABSENT), new.get(key, _ABSENT), below)
-            if found is not None:
-                return found
+            deeper = _difference(old.get(key, _ABSENT), new.get(key, _ABSENT), below)
+            if deeper is not None:
+                return deeper
         if list(old) != list(new) and path in ("factors", "fields"):
             return path, list(old), list(new)
         return None
@@ -211,8 +211,8 @@ def _difference(before: Any, now: Any, path: str) -> tuple[str, Any, Any] | None
         first, second = cast("Sequence[Any]", before), cast("Sequence[Any]", now)
         if len(first) == len(second):
             pairs = enumerate(zip(first, second, strict=True))
-            found = (_difference(one, other, f"{path}[{k}]") for k, (one, other) in pairs)
-            return next((each for each in found if each is not None), None)
+            deeper = (_difference(one, other, f"{path}[{k}]") for k, (one, other) in pairs)
+            return next((each for each in deeper if each is not None), None)
     same = type(before) is type(now) and before == now  # pyright: ignore[reportUnknownArgumentType]
     return None if same else (path, before, now)  # pyright: ignore[reportUnknownVariableType]
 

@@ -17,8 +17,8 @@ def assumption_notice(broken: int, judged: int) -> str:
         return ""
     trials = "trial" if judged == 1 else "trials"
     verdicts = "this verdict says" if judged == 1 else "these verdicts say"
-    found = f"e-agents broke what is assumed of them (E1 to E6) in {broken} of {judged} {trials}"
-    return f"{found}: {verdicts} little about the controller"
+    says = f"e-agents broke what is assumed of them (E1 to E6) in {broken} of {judged} {trials}"
+    return f"{says}: {verdicts} little about the controller"
 
 
 def fault_notice(ends: Mapping[str, int], trials: int, first: str) -> str:

@@ -85,9 +85,9 @@ class RayCrew:
             If the cluster has not shown a sign of life for `SILENCE` seconds.
         """
         while True:
-            found = self._take(SILENCE)
-            if found is not None:
-                return [found]
+            answers = self._take(SILENCE)
+            if answers is not None:
+                return [answers]
 
     def close(self) -> None:
         """Leave the cluster, which stops what is under way; a local one ends."""
@@ -113,8 +113,8 @@ class RayCrew:
             return None
         return self._outcome(*rest)
 
-    def _outcome(self, number: int, found: bytes | None) -> Outcome:
-        return Outcome(self._under_way.pop(number), None if found is None else pickle.loads(found))
+    def _outcome(self, number: int, answer: bytes | None) -> Outcome:
+        return Outcome(self._under_way.pop(number), None if answer is None else pickle.loads(answer))
 
     def _count(self, processors: int) -> None:
         self._processors = processors

@@ -91,8 +91,8 @@ def part_schema(metrics: Sequence[Column] = ()) -> Any:
 
 def answer_s(part: bytes) -> float | None:
     """Return how long an answer took in the trials of a part, seconds, on average; None if nobody was asked."""
-    found = arrow().parquet.read_table(BytesIO(part), columns=["act_mean_s"])["act_mean_s"]
-    return arrow().compute.mean(found).as_py()
+    column = arrow().parquet.read_table(BytesIO(part), columns=["act_mean_s"])["act_mean_s"]
+    return arrow().compute.mean(column).as_py()
 
 
 def encoded(columns: Columns, metrics: Sequence[Column] = ()) -> bytes:

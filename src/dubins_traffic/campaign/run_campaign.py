@@ -55,14 +55,14 @@ class Part:
     def run(self, cancelled: Cancelled) -> bytes:
         """Run the chunk."""
         with put_back():
-            found = run_chunk(self.chunk, self.records, cancelled)
-        return rows.encoded(found, scores.columns(self.chunk.metrics))
+            part = run_chunk(self.chunk, self.records, cancelled)
+        return rows.encoded(part, scores.columns(self.chunk.metrics))
 
     def crashed(self) -> bytes:
         """Return the part of a table in which its trials ended their process each time they were run."""
         metrics = scores.columns(self.chunk.metrics)
-        found = [rows.failure(trial.number, rows.CRASHED, CRASH, metrics) for trial in self.trials]
-        return rows.encoded(rows.columns(found, metrics), metrics)
+        lost = [rows.failure(trial.number, rows.CRASHED, CRASH, metrics) for trial in self.trials]
+        return rows.encoded(rows.columns(lost, metrics), metrics)
 
 
 def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Cancelled = never) -> rows.Columns:
@@ -83,14 +83,14 @@ def run_chunk(chunk: Chunk, records: Records | None = None, cancelled: Cancelled
     _ = egos.shared  # that there is no such controller is told here
     makers = scores.makers(chunk.metrics)
     chunk = replace(chunk, configuration=_known(chunk.configuration))
-    found: dict[int, rows.Row] = {}
+    by_number: dict[int, rows.Row] = {}
     together = [k for k in range(chunk.count) if not _is_alone(chunk, k, records)]
     for first in range(0, len(together), TOGETHER):
-        found |= _together(chunk, egos, together[first : first + TOGETHER], cancelled, makers)
+        by_number |= _together(chunk, egos, together[first : first + TOGETHER], cancelled, makers)
     for k in range(chunk.count):
-        if k not in found or (records is not None and _is_recorded(records, chunk.number + k, found[k])):
-            found[k] = _row(chunk, k, records, cancelled)
-    return rows.columns([found[k] for k in range(chunk.count)], scores.columns(makers))
+        if k not in by_number or (records is not None and _is_recorded(records, chunk.number + k, by_number[k])):
+            by_number[k] = _row(chunk, k, records, cancelled)
+    return rows.columns([by_number[k] for k in range(chunk.count)], scores.columns(makers))
 
 
 def _is_alone(chunk: Chunk, k: int, records: Records | None) -> bool:
@@ -118,15 +118,15 @@ def _together(
 
     Errors of the others come up when they are run by themselves.
     """
-    found: dict[int, rows.Row] = {}
+    by_number: dict[int, rows.Row] = {}
     try:
         instances = list(draw_many(chunk.configuration, chunk.seed, [chunk.trial + k for k in some]))
         for outcome in run_together(instances, egos, cancelled, metrics):
             k = outcome.instance.trial - chunk.trial
-            found[k] = rows.row(chunk.number + k, outcome.ending, outcome.score, outcome.act_s)
+            by_number[k] = rows.row(chunk.number + k, outcome.ending, outcome.score, outcome.act_s)
     except (Exception, SystemExit):  # the trial at fault is found when each is run by itself
         return {}
-    return found
+    return by_number
 
 
 def _known(configuration: Configuration) -> Configuration:
@@ -146,15 +146,15 @@ def _row(chunk: Chunk, k: int, records: Records | None, cancelled: Cancelled) ->
     record = None if records is None else records.path(number)
     try:
         result = chunk.job(k, record).run(cancelled)
-        found = rows.row(number, result.ending, result.score, result.wall.act_s)
+        row = rows.row(number, result.ending, result.score, result.wall.act_s)
     except DubinsTrafficError as error:
-        found = rows.failure(number, rows.FAILED, str(error), scores.columns(chunk.metrics))
+        row = rows.failure(number, rows.FAILED, str(error), scores.columns(chunk.metrics))
     except (Exception, SystemExit) as error:  # one failed trial becomes a row and never ends the campaign
         told = f"{type(error).__name__}: {error}"
-        found = rows.failure(number, rows.FAILED, told, scores.columns(chunk.metrics))
-    if records is not None and record is not None and not records.keeps(found):
+        row = rows.failure(number, rows.FAILED, told, scores.columns(chunk.metrics))
+    if records is not None and record is not None and not records.keeps(row):
         remove_record(record)
-    return found
+    return row
 
 
 Progress = Callable[[int, int], object]
@@ -237,8 +237,8 @@ def run_left(folder: Folder, crew: Crew, progress: Progress | None = None) -> No
     pace = Pace()
     left = pace.pieces(folders.remaining(folder.campaign.chunks(), done))
     parts = (Part(chunk, folder.records) for chunk in left)
-    for part, found in carry_out(crew, parts, apart=lambda part: part.trials):
-        table = part.crashed() if found is None else found
+    for part, finished in carry_out(crew, parts, apart=lambda part: part.trials):
+        table = part.crashed() if finished is None else finished
         folder.keep(part.chunk, table)
         pace.note(part.chunk, rows.answer_s(table))
         count += part.chunk.count

@@ -224,7 +224,7 @@ class Bicycle:
 
         There are two pieces if the goal is reached within the part.
         """
-        found: list[tuple[float, float]] = []
+        speeds: list[tuple[float, float]] = []
         left = self._step
         while left > 0.0 and self._speed != goal:
             through = self._speed * goal < 0.0
@@ -238,11 +238,11 @@ class Bicycle:
             else:
                 self._speed += rate * left if target > before else -rate * left
                 spent = left
-            found.append((0.5 * (before + self._speed), spent))
+            speeds.append((0.5 * (before + self._speed), spent))
             left -= spent
         if left > 0.0:
-            found.append((self._speed, left))
-        return found
+            speeds.append((self._speed, left))
+        return speeds
 
 
 def _turned(tangent: float, wanted: float, step: float) -> float:

@@ -242,9 +242,9 @@ def candidates(b: int, distance: float, margin: float, state: State, obstacles: 
     not written.
     """
     if state.count[b] <= FEW:
-        found = _all_pairs(state, b, distance, search.pair)
+        count = _all_pairs(state, b, distance, search.pair)
     else:
-        found = _cell_pairs(state, b, distance, search)
+        count = _cell_pairs(state, b, distance, search)
     for p in range(obstacles.off[b], obstacles.off[b + 1]):
         part = obstacles.parts[p]
         far = part.reach + margin
@@ -252,17 +252,17 @@ def candidates(b: int, distance: float, margin: float, state: State, obstacles: 
             dx = state.x[b, i] - part.x
             dy = state.y[b, i] - part.y
             if dx * dx + dy * dy < far * far:
-                _keep_pair(found, i, -1 - p, search.pair)
-                found += 1
-    return found
+                _keep_pair(count, i, -1 - p, search.pair)
+                count += 1
+    return count
 
 
 @jit_inline
-def _keep_pair(found: int, i: int, j: int, pair: Rows[Pair]) -> None:
-    """Write pair number `found`, if there is room for it."""
-    if found < pair.shape[0]:
-        pair[found].one = i
-        pair[found].other = j
+def _keep_pair(place: int, i: int, j: int, pair: Rows[Pair]) -> None:
+    """Write pair number `place`, if there is room for it."""
+    if place < pair.shape[0]:
+        pair[place].one = i
+        pair[place].other = j
 
 
 @jit
@@ -281,15 +281,15 @@ def _all_pairs(state: State, b: int, distance: float, pair: Rows[Pair]) -> int:
             near += 1 if dx * dx + dy * dy < limit else 0
     if near == 0:
         return 0
-    found = 0
+    count = 0
     for i in range(n - 1):
         for j in range(i + 1, n):
             dx = x[j] - x[i]
             dy = y[j] - y[i]
             if dx * dx + dy * dy < limit:
-                _keep_pair(found, i, j, pair)
-                found += 1
-    return found
+                _keep_pair(count, i, j, pair)
+                count += 1
+    return count
 
 
 @jit
@@ -300,7 +300,7 @@ def _cell_pairs(state: State, b: int, distance: float, search: Search) -> int:
     scale = 1.0 / distance
     for k in range(size):
         head[k] = -1
-    found = 0
+    count = 0
     limit = distance * distance
     for j in range(n):
         kx = floor(float(state.x[b, j] * scale))
@@ -310,8 +310,8 @@ def _cell_pairs(state: State, b: int, distance: float, search: Search) -> int:
                 i = _first_in_cell(head[_bucket(mx, my, size)], mx, my, link, cell)
                 while i >= 0:
                     if _distance2(state, b, i, j) < limit:
-                        _keep_pair(found, i, j, search.pair)
-                        found += 1
+                        _keep_pair(count, i, j, search.pair)
+                        count += 1
                     i = _first_in_cell(link[i], mx, my, link, cell)
         _enter_cell(j, kx, ky, head, link, cell)
-    return found
+    return count

@@ -275,8 +275,8 @@ class Frames:
     def __repr__(self) -> str:
         last = self.first + len(self) - 1
         cars = self.x.shape[1]
-        found = f"{len(self.contacts)} contacts, {len(self.events)} events"
-        return f"<Frames {self.first} to {last} of {cars} cars at {self.rate:g} Hz, {found}>"
+        counts = f"{len(self.contacts)} contacts, {len(self.events)} events"
+        return f"<Frames {self.first} to {last} of {cars} cars at {self.rate:g} Hz, {counts}>"
 
     def __len__(self) -> int:
         return int(self.x.shape[0])

@@ -103,9 +103,9 @@ def pack_obstacles(obstacles: Sequence[Sequence[Obstacle]]) -> ObstacleTable:
     owners: list[int] = []
     for each in obstacles:
         for number, obstacle in enumerate(each):
-            found = _parts(obstacle)
-            parts += found
-            owners += [number] * len(found)
+            of_obstacle = _parts(obstacle)
+            parts += of_obstacle
+            owners += [number] * len(of_obstacle)
         off.append(len(parts))
     columns = np.array(parts, dtype=np.float64).reshape(len(parts), 8)
     rows = table(Part, len(parts))

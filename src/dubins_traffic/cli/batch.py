@@ -87,8 +87,8 @@ def batch(
         append=append,
         metrics=metric or (),
     )
-    found = _run(run, count, records, json=json)
-    if not faults.tell_failed([(outcome.instance, outcome.ending) for outcome in found.outcomes]):
+    result = _run(run, count, records, json=json)
+    if not faults.tell_failed([(outcome.instance, outcome.ending) for outcome in result.outcomes]):
         raise typer.Exit(faults.FAILED)
 
 

@@ -160,7 +160,7 @@ def _attribute_docs(kind: type[Any]) -> Mapping[str, str]:
     """Return the docstrings of the attributes of a class, by name."""
     tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
     body = tree.body if isinstance(tree, ast.ClassDef) else []
-    found: dict[str, str] = {}
+    docs: dict[str, str] = {}
     for statement, below in pairwise(body):
         if (
             isinstance(statement, ast.AnnAssign)
@@ -168,8 +168,8 @@ def _attribute_docs(kind: type[Any]) -> Mapping[str, str]:
             and isinstance(below, ast.Expr)
         ):
             text = below.value.value if isinstance(below.value, ast.Constant) else ""
-            found[statement.target.id] = " ".join(str(text).split())
-    return found
+            docs[statement.target.id] = " ".join(str(text).split())
+    return docs
 
 
 def _line(configuration: Configuration) -> str:

@@ -67,8 +67,8 @@ def check(
         for (name, record), scored in zip(read, scores, strict=True)
     ]
     if json:
-        found = [_document(record, scored, relation) for record, _, scored, relation in judged]
-        print(json_text.dumps({"records": found}, indent=2))
+        documents = [_document(record, scored, relation) for record, _, scored, relation in judged]
+        print(json_text.dumps({"records": documents}, indent=2))
     else:
         for record, ending, scored, relation in judged:
             _show(shown(record), ending, scored)
@@ -102,14 +102,14 @@ def _played(relation: Relation) -> str:
 
 def _formulas(given: list[str]) -> dict[str, str]:
     """Return formulas by their names; one without a name is called by its text. InputError if two have one name."""
-    found: dict[str, str] = {}
+    by_name: dict[str, str] = {}
     for text in given:
         named = NAMED.fullmatch(text.strip())
         name, formula = (text.strip(), text) if named is None else (named[1].strip(), named[2])
-        if name in found:
+        if name in by_name:
             raise InputError("two formulas of one name", field="--formula", value=name)
-        found[name] = formula
-    return found
+        by_name[name] = formula
+    return by_name
 
 
 def _document(record: str, score: Score, relation: Relation | None) -> dict[str, Any]:

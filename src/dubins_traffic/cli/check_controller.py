@@ -74,12 +74,12 @@ def check_controller(
     if robust:
         _tabulate(dressed(controller, sandbox=boxes), json=json)
         return
-    found = check(dressed(controller, sandbox=boxes), None if over is None else over.value)
+    report = check(dressed(controller, sandbox=boxes), None if over is None else over.value)
     if json:
-        print(json_text.dumps(found.to_json(), indent=2))
+        print(json_text.dumps(report.to_json(), indent=2))
     else:
-        _show(found)
-    if not found.passed:
+        _show(report)
+    if not report.passed:
         raise typer.Exit(faults.FAILED)
 
 
@@ -92,7 +92,7 @@ def _tabulate(controller: str, *, json: bool) -> None:
     from dubins_traffic.cli.progress import progress
 
     with progress() as tell:
-        found = robustness(
+        measured = robustness(
             controller,
             workers=os.cpu_count() or 1,
             delays=DELAYS,
@@ -101,7 +101,7 @@ def _tabulate(controller: str, *, json: bool) -> None:
             progress=tell,
         )
     if json:
-        print(json_text.dumps(found.to_json(), indent=2))
+        print(json_text.dumps(measured.to_json(), indent=2))
         return
     console = Console(highlight=False)
     console.print("Clean trials (counted rounds), by the noise of the poses that it sees:")
@@ -111,7 +111,7 @@ def _tabulate(controller: str, *, json: bool) -> None:
         for noise in NOISES:
             table.add_column(f"{noise * 1e3:g} mm", justify="right")
         for delay in DELAYS:
-            cells = [found.cell(delay, noise, loss) for noise in NOISES]
+            cells = [measured.cell(delay, noise, loss) for noise in NOISES]
             texts = [f"{cell.clean}/{cell.trials} ({cell.counted_rounds})" for cell in cells]
             table.add_row(f"{delay} tick" + "s" * (delay != 1), *texts)
         console.print(table)

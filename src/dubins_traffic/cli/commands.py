@@ -69,10 +69,10 @@ def _options(  # pyright: ignore[reportUnusedFunction]
     if version:
         from dubins_traffic.release import release
 
-        found = release()
-        print(f"{faults.PROGRAM} {found.version}")
-        print(f"commit {found.commit or 'unknown'}")
-        print(f"sources sha256 {found.sources}")
+        installed = release()
+        print(f"{faults.PROGRAM} {installed.version}")
+        print(f"commit {installed.commit or 'unknown'}")
+        print(f"sources sha256 {installed.sources}")
         raise typer.Exit
     if context.invoked_subcommand is None:
         print(context.get_help())

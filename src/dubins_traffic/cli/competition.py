@@ -65,11 +65,11 @@ def check(file: File) -> None:
     """Check a competition file, draw a trial of each configuration, and say what its phases are."""
     from dubins_traffic.competition.competition import load_competition
 
-    found = load_competition(file)
-    for phase in found.phases:
+    loaded = load_competition(file)
+    for phase in loaded.phases:
         phase.check_draws()
-    print(f"{shown(found.title)}: {found.ranking.metric}, ties by {found.ranking.ties}")
-    for phase in found.phases:
+    print(f"{shown(loaded.title)}: {loaded.ranking.metric}, ties by {loaded.ranking.ties}")
+    for phase in loaded.phases:
         print(f"  {phase.name}: {_phase_line(phase)}")
 
 
@@ -102,9 +102,9 @@ def open_phase(file: File, phase: PhaseName) -> None:
     from dubins_traffic.competition import sealing
     from dubins_traffic.competition.competition import load_competition
 
-    found = load_competition(file)
-    opened = found.phase(phase)
-    published = sealing.publish(opened, found.title)
+    loaded = load_competition(file)
+    opened = loaded.phase(phase)
+    published = sealing.publish(opened, loaded.title)
     options.tell(str(sealing.commitment_path(opened)))
     print(f"commitment {published.commitment}")
 
@@ -145,9 +145,9 @@ def verify(
     phase_there = _phase(file, phase)
     path = Path(seeds) if seeds else sealing.revealed_path(phase_there)
     committed = commitment or sealing.read_published(sealing.commitment_path(phase_there)).commitment
-    found = read_seeds(read_text(path), str(path))
-    sealing.check_revealed(found, phase_there, committed)
-    print(f"{path}: {len(found.seeds)} seeds, as committed to")
+    published = read_seeds(read_text(path), str(path))
+    sealing.check_revealed(published, phase_there, committed)
+    print(f"{path}: {len(published.seeds)} seeds, as committed to")
 
 
 @competition.command("rank", epilog=RANK_EXAMPLES)
@@ -170,10 +170,10 @@ def rank(
     from dubins_traffic.competition.ranking import ranking_document
 
     phase_there = _phase(file, phase)
-    found = load_entries(entries, phase_there)
-    places = ranked(found, phase_there)
+    entered = load_entries(entries, phase_there)
+    places = ranked(entered, phase_there)
     if json:
-        print(json_text.dumps(ranking_document(found, phase_there), indent=2))
+        print(json_text.dumps(ranking_document(entered, phase_there), indent=2))
     else:
         _show(places, phase_there)
 

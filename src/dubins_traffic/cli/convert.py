@@ -89,28 +89,28 @@ def convert(
     if not Path(output).is_dir():
         options.require(output, "an output", ("",), overwrite=overwrite, apart_from=[file])
     with maps.telling(losses, file, output, overwrite=overwrite):
-        found = load(file, map_format=form)
-    network = found if isinstance(found, RoadNetwork) else None
+        document = load(file, map_format=form)
+    network = document if isinstance(document, RoadNetwork) else None
     maps.require_outputs(network, losses, file, output, overwrite=overwrite)
     suffix = Path(output).suffix.lower()
-    if suffix == WORLD and isinstance(found, RoadNetwork | Instance | Record):
-        what = found.instance if isinstance(found, Record) else found
+    if suffix == WORLD and isinstance(document, RoadNetwork | Instance | Record):
+        what = document.instance if isinstance(document, Record) else document
         write_sdf(what, output, Version(sdf.value), overwrite=overwrite)
-    elif isinstance(found, Record) and suffix == ".bag":
-        options.tell(output, str(write_bag(found, output, overwrite=overwrite)))
+    elif isinstance(document, Record) and suffix == ".bag":
+        options.tell(output, str(write_bag(document, output, overwrite=overwrite)))
         return
-    elif isinstance(found, Record) and suffix == "":
-        write_ros2_bag(found, output, overwrite=overwrite)
-    elif isinstance(found, Record):
-        export(found, output, overwrite=overwrite)
-    elif isinstance(found, RoadNetwork):
+    elif isinstance(document, Record) and suffix == "":
+        write_ros2_bag(document, output, overwrite=overwrite)
+    elif isinstance(document, Record):
+        export(document, output, overwrite=overwrite)
+    elif isinstance(document, RoadNetwork):
         if formats.of_suffix(output, form) is None:
             expected = f"a suffix of {', '.join((*formats.suffixes(form), WORLD))}"
             raise InputError(
                 "not a container of road networks", file=output, value=Path(output).suffix, expected=expected
             )
-        found.write(output, form, overwrite=overwrite)
-        maps.report(found, losses, overwrite=overwrite)
+        document.write(output, form, overwrite=overwrite)
+        maps.report(document, losses, overwrite=overwrite)
     else:
         raise InputError("can't be converted", file=file, expected="a road network or a record")
     options.tell(output)

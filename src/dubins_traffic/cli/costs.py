@@ -36,11 +36,11 @@ def worst(sheet: ScoreSheet) -> list[str]:
     """
     if len({score.controller for score in sheet.trials}) > 1:
         return []
-    found = [cost for score in sheet.trials for cost in costs_of(score)]
-    if not found:
+    costs = [cost for score in sheet.trials for cost in costs_of(score)]
+    if not costs:
         return []
-    what, number = Counter(cost.what for cost in found).most_common(1)[0]
-    first = next(cost for cost in found if cost.what == what)
+    what, number = Counter(cost.what for cost in costs).most_common(1)[0]
+    first = next(cost for cost in costs if cost.what == what)
     often = "once" if number == 1 else f"{number} times"
     where = f"trial {first.score.trial} at {first.time:.2f} s"
     said = f"Cost most: {what}, {often}, {'in' if number == 1 else 'first in'} {where}."

@@ -58,16 +58,16 @@ def estimate(
     from dubins_traffic.falsification.estimate import estimate as run
 
     with faults.controllers_drive(), progress(what="trials") as tell:
-        found = run(
+        estimated = run(
             configuration, dressed(controller, shield=shield), event=event, below=below, method=method, trials=trials,
             seed=seed, duration=duration, particles=particles, runs=runs, workers=workers,
             progress=lambda done: tell(done, trials or done),
         )  # fmt: skip
     if json:
-        print(json_text.dumps(found.to_json(), indent=2))
+        print(json_text.dumps(estimated.to_json(), indent=2))
     else:
-        _show(found)
-    faults.fail_if(found.fault)
+        _show(estimated)
+    faults.fail_if(estimated.fault)
 
 
 def _show(probability: Probability) -> None:

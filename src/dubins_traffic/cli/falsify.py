@@ -119,14 +119,14 @@ def falsify(
             seen[:] = [going]
             tell(going.finished, trials or going.finished)
 
-        found = search(
+        result = search(
             configuration, driver, output, rules=rule or (), formula=formula, least_score=least_score,
             trials=trials, seconds=seconds, seed=seed, strategy=strategy, duration=duration or None,
             workers=workers, ray=ray, resume=resume, progress=heard,
         )  # fmt: skip
-    _show(found, json=json)
-    options.tell(output, str(found.page))
-    faults.fail_if(found.fault)
+    _show(result, json=json)
+    options.tell(output, str(result.page))
+    faults.fail_if(result.fault)
 
 
 @contextlib.contextmanager
@@ -178,10 +178,10 @@ def shrink(
         driver: str | Remote | None = None
         if controller is not None or over is not None:
             driver = held.enter_context(driven(controller or "", over, shield=shield))
-        found = smaller(case, driver, progress=lambda what: faults.tell(f"without {what}"))
-        found.write(target, overwrite=overwrite)
-        write_page(found, page, driver, overwrite=overwrite)
-    print(found.story.sentence)
+        smallest = smaller(case, driver, progress=lambda what: faults.tell(f"without {what}"))
+        smallest.write(target, overwrite=overwrite)
+        write_page(smallest, page, driver, overwrite=overwrite)
+    print(smallest.story.sentence)
     options.tell(target, page)
 
 
@@ -198,39 +198,39 @@ def regress(
     from dubins_traffic.falsification.regress import regress as run
 
     with driven(controller, over, shield=shield) as driver:
-        found = run(folder, driver)
+        replayed = run(folder, driver)
     if json:
-        print(json_text.dumps([case.to_json() for case in found], indent=2))
+        print(json_text.dumps([case.to_json() for case in replayed], indent=2))
     else:
-        for case in found:
+        for case in replayed:
             print(f"{case.file.name}: {case.sentence or case.fault or case.verdict}")
-        faulty = sum(bool(case.fault) for case in found)
+        faulty = sum(bool(case.fault) for case in replayed)
         ended = f", {faulty} ended by a fault" if faulty else ""
-        print(f"{sum(case.passed for case in found)} of {len(found)} cases passed{ended}")
-    if not all(case.passed for case in found):
+        print(f"{sum(case.passed for case in replayed)} of {len(replayed)} cases passed{ended}")
+    if not all(case.passed for case in replayed):
         raise typer.Exit(faults.FAILED)
 
 
-def _show(found: Found, *, json: bool) -> None:
-    _warn(found.coverage)
+def _show(result: Found, *, json: bool) -> None:
+    _warn(result.coverage)
     if json:
         document = {
-            "trials": found.trials,
-            "discarded": found.discarded,
-            "faulty": found.faulty,
-            "fault": found.fault,
-            "violated": found.violated,
-            "cases": {name: case.story.sentence for name, case in found.cases.items()},
-            "coverage": [row.to_json() for row in found.coverage],
+            "trials": result.trials,
+            "discarded": result.discarded,
+            "faulty": result.faulty,
+            "fault": result.fault,
+            "violated": result.violated,
+            "cases": {name: case.story.sentence for name, case in result.cases.items()},
+            "coverage": [row.to_json() for row in result.coverage],
         }
         print(json_text.dumps(document, indent=2))
         return
-    _table(found.coverage)
+    _table(result.coverage)
     print(
-        f"{found.trials} trials: the ego broke a rule in {found.violated}, e-agents broke the assumption first in "
-        f"{found.discarded} (discarded), {found.faulty} ended by a fault; {len(found.cases)} kinds of failure"
+        f"{result.trials} trials: the ego broke a rule in {result.violated}, e-agents broke the assumption first in "
+        f"{result.discarded} (discarded), {result.faulty} ended by a fault; {len(result.cases)} kinds of failure"
     )
-    for name, case in found.cases.items():
+    for name, case in result.cases.items():
         print(f"{name}: {case.story.sentence}")
 
 

@@ -62,8 +62,8 @@ def listing(
             print(f"    ({remark})")
 
 
-def _print_json(subject: Subject, found: list[Any]) -> None:
-    print(json_text.dumps({subject.value: found}, indent=2))
+def _print_json(subject: Subject, listed: list[Any]) -> None:
+    print(json_text.dumps({subject.value: listed}, indent=2))
 
 
 def _print_parameters(parameters: Sequence[Parameter], indent: str) -> None:

@@ -164,8 +164,8 @@ def _losses(network: RoadNetwork | None) -> Losses | None:
     from dubins_traffic.maps.losses import Losses
     from dubins_traffic.roads.formats import registry as formats
 
-    found = None if network is None else network.known.get(formats.LOSSES)
-    return found if isinstance(found, Losses) else None
+    losses = None if network is None else network.known.get(formats.LOSSES)
+    return losses if isinstance(losses, Losses) else None
 
 
 def _is_json(output: str) -> bool:

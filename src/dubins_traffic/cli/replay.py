@@ -97,19 +97,19 @@ def replay(
     for name, value in () if moves else chosen.items():
         expected = "no such option for a page, which plays the whole trial at any speed"
         raise InputError("of a moving picture", field=OPTIONS[name], value=value, expected=expected)
-    found = load_record(record)
-    scored = score(found)
+    loaded = load_record(record)
+    scored = score(loaded)
     if moves:
         usual: dict[str, Any] = {"fps": VIDEO_FPS} if suffix in CODECS else {}
-        moving = animate(found, **(usual | chosen), verdict=scored.verdict)
+        moving = animate(loaded, **(usual | chosen), verdict=scored.verdict)
         with progress(len(moving), what="pictures") as tell:
             moving.write(output, overwrite=overwrite, progress=tell)
     else:
         write_replay(
             output,
-            found.instance,
-            found.frames,
-            found.ending,
+            loaded.instance,
+            loaded.frames,
+            loaded.ending,
             summary(scored),
             formula_marks(scored.formulas),
             scored.verdict,

@@ -46,19 +46,19 @@ def check(
             f"{'container images':<28} {f'refused: {refused}' if refused else 'podman unpacks them, into such boxes'}"
         )
         print(f"\nlimits, unless others are told: {asdict(Limits())}\n")
-    found = [] if layers.missing() or not attacks else _attacked(quiet=json)
-    through = [each.attack.name for each in found if not each.stopped]
+    strikes = [] if layers.missing() or not attacks else _attacked(quiet=json)
+    through = [each.attack.name for each in strikes if not each.stopped]
     if json:
         document = {
             "user": os.getuid(),
             "limits": mechanisms,
             "missing": layers.missing(),
             "images": refused or None,
-            "attacks": [_document(each) for each in found],
+            "attacks": [_document(each) for each in strikes],
         }
         print(json_text.dumps(document, indent=2))
-    elif found:
-        print(f"{len(found) - len(through)} of {len(found)} attacks stopped")
+    elif strikes:
+        print(f"{len(strikes) - len(through)} of {len(strikes)} attacks stopped")
     layers.require()
     if through:
         faults.tell(f"{len(through)} attacks got through: {'; '.join(through)}")
@@ -71,13 +71,13 @@ def _attacked(*, quiet: bool) -> list[Strike]:
     from dubins_traffic.sandbox.available import available_layers
     from dubins_traffic.sandbox.suite import strikes
 
-    found: list[Strike] = []
+    landed: list[Strike] = []
     for each in strikes(available_layers()):
-        found.append(each)
+        landed.append(each)
         if not quiet:
             mark = "ok    " if each.stopped else "FAILED"
             print(f"{mark} {each.attack.name:<46} {'/'.join(each.attack.layers):<22} {shown(each.words, 90)}")
-    return found
+    return landed
 
 
 def _document(each: Strike) -> dict[str, object]:

@@ -85,16 +85,16 @@ def spec(
         raise InputError("not a period", field="--period", value=period, expected="seconds > 0")
     suffixes = PLAIN if format is None else SUFFIXES.get(format, PLAIN)
     options.require(output, "a specification", suffixes, overwrite=overwrite, apart_from=[instance], standard=True)
-    found = _instance(instance)
+    judged = _instance(instance)
     try:
-        whole = task(found.problem, found.names)
+        whole = task(judged.problem, judged.names)
     except InputError as error:
         raise error.within(file=instance) from None
     wanted = _part(whole, assumption)
     if format is None:
-        text = _in_our_syntax(wanted, " &&\n" if found.problem.rules else " && ")
+        text = _in_our_syntax(wanted, " &&\n" if judged.problem.rules else " && ")
     else:
-        text = _in_language(wanted, format, period or found.problem.period, instance)
+        text = _in_language(wanted, format, period or judged.problem.period, instance)
     options.write(text if text.endswith("\n") else text + "\n", output)
 
 
@@ -103,14 +103,14 @@ def _instance(source: str) -> Instance:
     from dubins_traffic.record.reader import Record
     from dubins_traffic.runs.sources import load
 
-    found = load(source)
-    if isinstance(found, Record):
-        return found.instance
-    if isinstance(found, Instance):
-        if not found.problem.rules:
+    loaded = load(source)
+    if isinstance(loaded, Record):
+        return loaded.instance
+    if isinstance(loaded, Instance):
+        if not loaded.problem.rules:
             without = "no rules of the road are in it, so the task is its goals alone"
             tell(f"{source}: {without} (`instance --full` keeps rules)")
-        return found
+        return loaded
     raise InputError("has no task", file=source, expected="a problem instance or a record")
 
 

@@ -38,13 +38,13 @@ def list_suites(json: options.Json = False) -> None:
     """List the suites that are shipped, with their hashes."""
     from dubins_traffic.suites.suite import load_suite, shipped_suites
 
-    found = [load_suite(name) for name in shipped_suites()]
+    suites = [load_suite(name) for name in shipped_suites()]
     if json:
-        entries = [{"name": suite.name, "hash": suite.hash, "title": suite.model.title} for suite in found]
+        entries = [{"name": suite.name, "hash": suite.hash, "title": suite.model.title} for suite in suites]
         print(json_text.dumps({"suites": entries}, indent=2))
         return
-    width = max(len(suite.label) for suite in found)
-    for listed in found:
+    width = max(len(suite.label) for suite in suites)
+    for listed in suites:
         print(f"{listed.label:{width}}  {listed.model.title}")
 
 
@@ -53,14 +53,14 @@ def show(name: Name, json: options.Json = False) -> None:
     """Say what a suite consists of; with --json its file."""
     from dubins_traffic.suites.suite import load_suite
 
-    found = load_suite(name)
+    loaded = load_suite(name)
     if json:
-        print(json_text.dumps(found.document, indent=2))
+        print(json_text.dumps(loaded.document, indent=2))
         return
-    print(f"{found.name}: {found.model.title}")
-    ranked = "" if found.model.games else f", ranked by {found.model.metric}"
-    print(f"hash {found.hash}{ranked}")
-    print("\n".join(_contents(found)))
+    print(f"{loaded.name}: {loaded.model.title}")
+    ranked = "" if loaded.model.games else f", ranked by {loaded.model.metric}"
+    print(f"hash {loaded.hash}{ranked}")
+    print("\n".join(_contents(loaded)))
 
 
 def _contents(suite: Suite) -> list[str]:
@@ -152,25 +152,25 @@ def run(
     from dubins_traffic.suites.suite import load_suite
     from dubins_traffic.suites.writing import PAGE, write_results
 
-    found = load_suite(name)
-    _check_options(found, controllers, trials, workers, solver)
+    loaded = load_suite(name)
+    _check_options(loaded, controllers, trials, workers, solver)
     named = controllers or []
-    if found.model.games is None and not in_process:
-        named, notice = seated(named or ([] if found.model.cases is not None else found.controllers))
+    if loaded.model.games is None and not in_process:
+        named, notice = seated(named or ([] if loaded.model.cases is not None else loaded.controllers))
         if notice:
             faults.tell(notice)
-    if found.model.games is not None:
-        path = _games(found, Path(folder), solver, seconds, resume=resume)
-    elif found.model.cases is not None:
-        path = _cases(found, Path(folder), named, workers, resume=resume)
+    if loaded.model.games is not None:
+        path = _games(loaded, Path(folder), solver, seconds, resume=resume)
+    elif loaded.model.cases is not None:
+        path = _cases(loaded, Path(folder), named, workers, resume=resume)
     else:
-        path = _trials(found, Path(folder), named, trials, workers, resume=resume)
+        path = _trials(loaded, Path(folder), named, trials, workers, resume=resume)
     report = Path(folder) / "report"
-    print(write_results(found, open_sources([str(path)]), report, overwrite=True), end="")
+    print(write_results(loaded, open_sources([str(path)]), report, overwrite=True), end="")
     options.tell(str(path), str(report / PAGE))
-    if found.model.cases is not None:
-        faults.fail_if(running.faulty(Path(folder), found))
-    elif found.model.campaign is not None:
+    if loaded.model.cases is not None:
+        faults.fail_if(running.faulty(Path(folder), loaded))
+    elif loaded.model.campaign is not None:
         faults.fail_if(table.faulty(Path(folder)))
 
 
@@ -272,11 +272,11 @@ def compare(
     if name is None and first not in shipped_suites():
         file, expected = str(sources[0].path), "its file, by --suite"
         raise InputError("results of a suite that is not shipped", file=file, value=first, expected=expected)
-    found = load_suite(name or first)
+    loaded = load_suite(name or first)
     if output is None:
-        print(results(found, sources)[TABLE], end="")
+        print(results(loaded, sources)[TABLE], end="")
     else:
-        print(write_results(found, sources, Path(output), overwrite=overwrite), end="")
+        print(write_results(loaded, sources, Path(output), overwrite=overwrite), end="")
         options.tell(str(Path(output) / PAGE))
     if len({source.results.code for source in sources}) > 1:
         faults.tell(made_by(sources))

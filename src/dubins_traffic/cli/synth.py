@@ -142,7 +142,7 @@ def synth(
     instance = _instance(source, seed, trial)
     held = None if check is None else read_strategy(check)
     with _progress() as progress:
-        found = answer(
+        answered = answer(
             instance,
             cars=cars,
             assumption=None if assume is None else _parsed(assume),
@@ -150,8 +150,8 @@ def synth(
             limit=None if memory is None else memory << 20,
             progress=progress,
         )
-        reasons = found.explain(progress) if explain else []
-        game = found.solution.game
+        reasons = answered.explain(progress) if explain else []
+        game = answered.solution.game
         checked = None if check is None else check_strategy(check, game, instance, progress, held)
     if graph is not None:
         save_game(game, graph, overwrite=overwrite)
@@ -159,7 +159,7 @@ def synth(
         text = specification_text(game.board, start_cells(game.board, instance), Path(spec).suffix)
         write_text(spec, text)
     if strategy is not None:
-        won = Strategy.of(found.solution)
+        won = Strategy.of(answered.solution)
         won.first()
         check_ranks(game, won.ranks)
         won.save(strategy, overwrite=overwrite)
@@ -172,10 +172,10 @@ def synth(
         extra: dict[str, object] = {"explanation": reasons} if explain else {}
         if checked is not None:
             extra["check"] = checked.to_json(game)
-        print(json_text.dumps(found.to_json() | extra, indent=2))
+        print(json_text.dumps(answered.to_json() | extra, indent=2))
     else:
         told = [] if checked is None or check is None else checked.lines(check, game)
-        print("\n".join([*found.lines(), *reasons, *told]))
+        print("\n".join([*answered.lines(), *reasons, *told]))
     if checked is not None and not checked.wins:
         raise typer.Exit(1)
 
@@ -216,13 +216,13 @@ def _instance(source: str, seed: int, trial: int) -> Instance:
     from dubins_traffic.record.reader import Record
     from dubins_traffic.runs.sources import load
 
-    found = load(source, seed=seed)
-    if isinstance(found, Configuration):
-        return draw(found, seed, trial)
-    if isinstance(found, Record):
-        return found.instance
-    if isinstance(found, Instance):
-        return found
+    loaded = load(source, seed=seed)
+    if isinstance(loaded, Configuration):
+        return draw(loaded, seed, trial)
+    if isinstance(loaded, Record):
+        return loaded.instance
+    if isinstance(loaded, Instance):
+        return loaded
     raise InputError("has no goals", file=source, expected="a trials configuration, a problem instance or a record")
 
 

@@ -200,39 +200,39 @@ def _ranked(scores: Scores) -> dict[str, list[Score]]:
 
     That has the most counted rounds a trial, and among equal ones the most rounds before the first breach.
     """
-    found: dict[str, list[Score]] = {}
+    by_name: dict[str, list[Score]] = {}
     for score in scores:
-        found.setdefault(score.controller or "-", []).append(score)
+        by_name.setdefault(score.controller or "-", []).append(score)
 
     def merit(name: str) -> tuple[float, float]:
-        of_controller, trials = found[name], len(found[name])
+        of_controller, trials = by_name[name], len(by_name[name])
         counted = sum(score.counted_rounds for score in of_controller) / trials
         return counted, math.fsum(score.rounds_before_breach for score in of_controller) / trials
 
-    return {name: found[name] for name in sorted(found, key=merit, reverse=True)}
+    return {name: by_name[name] for name in sorted(by_name, key=merit, reverse=True)}
 
 
 def _needed(scores: Scores) -> dict[str, Column]:
     """Return the columns that some scores need: ours, then those of the metrics that were asked for."""
-    found = {heading: column for heading, column in COLUMNS.items() if column.needed(scores)}
+    columns = {heading: column for heading, column in COLUMNS.items() if column.needed(scores)}
     names = dict.fromkeys(metric.column for score in scores for metric in score.metrics)
-    return {**found, **{column.short or column.label: _further(column) for column in names}}
+    return {**columns, **{column.short or column.label: _further(column) for column in names}}
 
 
 def _further(column: metric.Column) -> Column:
     """Return what is shown of a further metric's column."""
 
     def cell(score: Score) -> str:
-        found = {metric.column: metric.value for metric in score.metrics}.get(column)
-        if found is None:
+        value = {metric.column: metric.value for metric in score.metrics}.get(column)
+        if value is None:
             return "-"
-        if isinstance(found, bool):
-            return yes(found)
-        if isinstance(found, str):
-            return shown(found)
+        if isinstance(value, bool):
+            return yes(value)
+        if isinstance(value, str):
+            return shown(value)
         if column.unit == "share":
-            return f"{found:.1%}"
-        return f"{found:.4g} {column.unit}".rstrip()
+            return f"{value:.1%}"
+        return f"{value:.4g} {column.unit}".rstrip()
 
     return Column(cell)
 

@@ -85,15 +85,15 @@ def verify(
 
     expected = _expected(instance, configuration, rnd, seed, trial, simulator)
     printed = None if scores is None else read_sheet(scores)
-    found: list[dict[str, Any]] = []
+    checked: list[dict[str, Any]] = []
     status = faults.OK
     for record in records:
         outcome = _outcome(record, expected, printed, quiet=json)
-        found.append(outcome)
+        checked.append(outcome)
         unread = "error" in outcome
         status = max(status, faults.WRONG_INPUT if unread else int(not outcome["verified"]))
     if json:
-        print(json_text.dumps({"records": found}, indent=2))
+        print(json_text.dumps({"records": checked}, indent=2))
     if status != faults.OK:
         raise typer.Exit(status)
 

@@ -179,9 +179,9 @@ def sought(kernel: Kernel[..., Any], kinds: tuple[Kind, ...]) -> Code | Waiting 
         return None
     key = kernel.key(kinds)
     path = store.kernel_file(key, loading.processor())
-    found = store.load(path)
-    if found is not None:
-        return Code(kinds, found[0], loading.load(found[1], symbol(key)))
+    code = store.load(path)
+    if code is not None:
+        return Code(kinds, code[0], loading.load(code[1], symbol(key)))
     if kept_alone:
         return None
     waiting = kernel.patient or waits()

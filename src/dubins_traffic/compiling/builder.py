@@ -126,13 +126,13 @@ def _compile(compiler: Compiler, wish: beside.Wish) -> None:
     try:
         sys.path.extend(path for path in wish.paths if path not in sys.path)
         kinds = ast.literal_eval(wish.kinds)
-        found = importlib.import_module(wish.module)
-        if not Path(found.__file__ or "").samefile(wish.file):
-            raise ImportError(f"{wish.module} is {found.__file__} here")
+        module = importlib.import_module(wish.module)
+        if not Path(module.__file__ or "").samefile(wish.file):
+            raise ImportError(f"{wish.module} is {module.__file__} here")
         key = key_of(Path(wish.file), wish.name, kinds)
         if store.kernel_file(key, target()) != wish.path:
             raise ImportError(f"{wish.file} is another than that which runs")
-        code, answer = compiler.machine_code(compiler.kernel(found, wish.name), kinds, symbol(key))
+        code, answer = compiler.machine_code(compiler.kernel(module, wish.name), kinds, symbol(key))
         store.save(wish.path, answer, code)
     except Exception as error:
         # Numba's messages end with a line of source: the last line of what is told says what is wrong.

@@ -99,8 +99,8 @@ class Compiler:
 
     def kernel(self, module: Any, name: str) -> Any:
         """Return what `jit` has made of a function, wherever that was, if it was."""
-        found = getattr(module, name)
-        return found if hasattr(found, "py_func") else self.jit(found, inlined=False, wide=False, rare=False)
+        kernel = getattr(module, name)
+        return kernel if hasattr(kernel, "py_func") else self.jit(kernel, inlined=False, wide=False, rare=False)
 
     def machine_code(self, kernel: Any, kinds: Sequence[Kind], symbol: str) -> tuple[bytes, Kind]:
         """Return an object file with the function `symbol`, and the kind of what the kernel returns.
@@ -250,14 +250,14 @@ def _leaves(context: Any, builder: Any, shape: Any, value: Any) -> Iterator[Any]
 
 def _reached(library: Any) -> list[Any]:
     """Return a library and all that it calls, over any steps, each once."""
-    found: dict[int, Any] = {}
+    kernels: dict[int, Any] = {}
     waiting = [library]
     while waiting:
         reached = waiting.pop()
-        if id(reached) not in found:
-            found[id(reached)] = reached
+        if id(reached) not in kernels:
+            kernels[id(reached)] = reached
             waiting.extend(reached._linking_libraries)
-    return list(found.values())
+    return list(kernels.values())
 
 
 def _close(program: Any, symbol: str) -> None:
@@ -324,10 +324,10 @@ def named(module: str, name: str) -> Any:
     """Return what a module calls `name`."""
     from importlib import import_module
 
-    found: Any = import_module(module)
+    thing: Any = import_module(module)
     for part in name.split("."):
-        found = getattr(found, part)
-    return found
+        thing = getattr(thing, part)
+    return thing
 
 
 def _kind_of(numba_type: Any) -> Kind:

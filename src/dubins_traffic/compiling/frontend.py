@@ -180,33 +180,33 @@ def _list_variables_quickly() -> None:
 
 
 def _of_statement(statement: Any) -> list[Any]:
-    found: list[Any] = []
+    parts: list[Any] = []
     for value in statement.__dict__.values():
-        _gather(value, found)
-    return found
+        _gather(value, parts)
+    return parts
 
 
 def _of_expression(expression: Any) -> list[Any]:
-    found: list[Any] = []
+    parts: list[Any] = []
     for value in expression._kws.values():
-        _gather(value, found)
-    return found
+        _gather(value, parts)
+    return parts
 
 
-def _gather(value: Any, found: list[Any]) -> None:
+def _gather(value: Any, parts: list[Any]) -> None:
     kind: Any = value.__class__
     if kind is _VARIABLE:
-        found.append(value)
+        parts.append(value)
     elif kind in _WITHOUT:
         pass
     elif kind is tuple or kind is list:
         for part in value:
-            _gather(part, found)
+            _gather(part, parts)
     elif kind is dict:
         for part in value.values():
-            _gather(part, found)
+            _gather(part, parts)
     elif isinstance(value, _ir.Inst):
-        found.extend(value.list_vars())
+        parts.extend(value.list_vars())
 
 
 _VARIABLE: Any = _ir.Var

@@ -94,11 +94,11 @@ def _clean(text: str, limit: int) -> str:
 
 def _folders() -> set[str]:
     """Return the folders, each with a separator at its end, that mean something on this machine only."""
-    found: set[str] = set()
+    folders: set[str] = set()
     for make in (*(Path(place).absolute for place in sys.path if place), Path.cwd, Path.home):
         with contextlib.suppress(OSError, RuntimeError):  # the current folder was removed, a home is unknown
-            found.add(str(make()))
-    return {place.rstrip(os.sep) + os.sep for place in found} - {os.sep}
+            folders.add(str(make()))
+    return {place.rstrip(os.sep) + os.sep for place in folders} - {os.sep}
 
 
 def _own_lines(frames: TracebackType | None) -> Iterator[str]:

@@ -108,13 +108,13 @@ class Lanes:
 
     def _find_round(self) -> Round | None:
         goals = self._problem.goal_vertices
-        found = find_round(self._graph, goals)
-        if found is None or found.length < IMPOSSIBLE:
-            return found
+        way = find_round(self._graph, goals)
+        if way is None or way.length < IMPOSSIBLE:
+            return way
         alone = {goal: find_round(self._graph, (goal,)) for goal in set(goals)}
-        lengths = {goal: found.length if found is not None else inf for goal, found in alone.items()}
-        found = find_round(self._graph, [goal for goal in goals if lengths[goal] < IMPOSSIBLE])
-        return found if found is not None and found.length < IMPOSSIBLE else None
+        lengths = {goal: way.length if way is not None else inf for goal, way in alone.items()}
+        way = find_round(self._graph, [goal for goal in goals if lengths[goal] < IMPOSSIBLE])
+        return way if way is not None and way.length < IMPOSSIBLE else None
 
     def _prepared(self, known: Knowledge | None, tick: int, pose: Pose) -> Knowledge:
         """Return what is known, now that the car is at a pose: all that there is to know, or with less blocked."""

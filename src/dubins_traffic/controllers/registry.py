@@ -103,10 +103,10 @@ def is_shielded(spec: str) -> bool:
 
 def shield_of(spec: str) -> tuple[str, str] | None:
     """Split a name into that of the controller under the shield and when that overtakes; None without a shield."""
-    found = _SHIELD.search(spec)
-    if found is None:
+    match = _SHIELD.search(spec)
+    if match is None:
         return None
-    return spec[: found.start()], USUAL if found["overtakes"] is None else found["overtakes"]
+    return spec[: match.start()], USUAL if match["overtakes"] is None else match["overtakes"]
 
 
 def shielded(spec: str) -> str:

@@ -134,14 +134,14 @@ def run_batch(
         drawn = partial(draw, configuration, seed)
         there = claim(folder, called(controller), drawn, overwrite=overwrite, append=append)
         each = _recorded(each, folder, there, lambda done: kept(done.instance.trial - first, done), controller, makers)
-    found: list[Outcome] = []
+    outcomes_so_far: list[Outcome] = []
     for outcome in each:
-        found.append(outcome)
+        outcomes_so_far.append(outcome)
         if ended is not None:
             ended(outcome)
         if progress is not None:
-            progress(len(found))
-    return in_order(found)
+            progress(len(outcomes_so_far))
+    return in_order(outcomes_so_far)
 
 
 def in_order(outcomes: Iterable[Outcome]) -> Batch:

@@ -253,12 +253,12 @@ class AskedGroup(SteppedGroup):
 
     def outcomes(self, trials: Sequence[int], controller: str) -> list[Outcome]:
         """Return the outcomes of trials that have ended, with what their controllers took and their shields did."""
-        found: list[Outcome] = []
+        ended: list[Outcome] = []
         for b, outcome in zip(trials, super().outcomes(trials, controller), strict=True):
             score = replace(outcome.score, interventions=self._interventions[b])
             latencies = summary(self._seats[b].latencies if self._seats else ())
-            found.append(replace(outcome, score=score, act_s=latencies))
-        return found
+            ended.append(replace(outcome, score=score, act_s=latencies))
+        return ended
 
     def _time_to_begin(self, b: int) -> float | None:
         return self._seats[b].begin if self._seats else None

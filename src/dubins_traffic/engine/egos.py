@@ -92,12 +92,12 @@ class Egos:
 
     def ways(self, instances: Iterable[Instance]) -> dict[Way, list[Instance]]:
         """Return the trials that run in each way, in their order."""
-        found: dict[Way, list[Instance]] = {way: [] for way in Way}
+        by_way: dict[Way, list[Instance]] = {way: [] for way in Way}
         fits: dict[tuple[Any, ...], bool] = {}
         kept = list(instances)  # what tells trials apart is the identity of their parts, so all have to stay
         for instance in kept:
-            found[self._way(instance, fits)].append(instance)
-        return found
+            by_way[self._way(instance, fits)].append(instance)
+        return by_way
 
     def _way(self, instance: Instance, fits: dict[tuple[Any, ...], bool]) -> Way:
         """Return how a trial runs; `fits` keeps, for trials that are alike, whether their cars can keep the rules."""

@@ -293,7 +293,7 @@ class Group:
         judged = [own for b in trials if (own := self.instances[b].problem).rules]
         find_all([(problem.network, problem.goal_vertices) for problem in judged])
         margins = self.margins(rows)
-        found: list[Outcome] = []
+        ended: list[Outcome] = []
         pending = pending_of(rows, world.terms, world.breach_log)
         for b, ending, hanging in zip(trials, endings, pending, strict=True):
             instance, contacts, breaches = self.instances[b], self.contacts[b], self.breaches[b]
@@ -308,8 +308,8 @@ class Group:
                 self._buffer.end(ending, b)
                 own = [sink for sink in self._buffer.sinks(b) if isinstance(sink, OwnMetrics)]
                 score = replace(score, metrics=own[0].result())
-            found.append(Outcome(self.instances[b], ending, score))
-        return found
+            ended.append(Outcome(self.instances[b], ending, score))
+        return ended
 
     def _time_to_begin(self, _b: int) -> float | None:
         """Return how long the driver of trial b took to begin, seconds, if that was measured."""

@@ -137,8 +137,8 @@ class Bank:
             Whether some have ended.
         """
         group, ended = self.group, False
-        while found := self._step(rows, envs, ticks, group.commands, group.world, self.outlook, self.steps):
-            if found < 0:
+        while status := self._step(rows, envs, ticks, group.commands, group.world, self.outlook, self.steps):
+            if status < 0:
                 raise InputError("not an action", field="action", expected="finite numbers")
             self._settle(rows)
             if self.between:
@@ -323,10 +323,10 @@ class Fleet:
         DubinsTrafficError
             If it is in none.
         """
-        found = self._seats[env]
-        if found is None:
+        seat = self._seats[env]
+        if seat is None:
             raise DubinsTrafficError("an environment has to be reset before it is used")
-        return found
+        return seat
 
     def instance(self, env: int) -> Instance:
         """Return the instance of an environment's trial."""
@@ -355,23 +355,23 @@ class Fleet:
 
     def outcomes(self, envs: Sequence[int]) -> list[Outcome]:
         """Return the outcomes of the trials of environments, which have ended."""
-        found: dict[int, Outcome] = {}
+        by_env: dict[int, Outcome] = {}
         for bank, rows, places in self._grouped(envs):
-            found.update(zip(places.tolist(), bank.group.outcomes(rows.tolist(), "env"), strict=True))
+            by_env.update(zip(places.tolist(), bank.group.outcomes(rows.tolist(), "env"), strict=True))
             for row, env in zip(rows.tolist(), places.tolist(), strict=True) if bank.between else ():
-                score = replace(found[env].score, interventions=bank.between[row].interventions)
-                found[env] = replace(found[env], score=score)
-        return [found[env] for env in envs]
+                score = replace(by_env[env].score, interventions=bank.between[row].interventions)
+                by_env[env] = replace(by_env[env], score=score)
+        return [by_env[env] for env in envs]
 
     def _grouped(self, envs: Sequence[int]) -> list[tuple[Bank, Ints, Ints]]:
         """Return the banks of some environments, with the rows and environments of each."""
-        found: dict[int, tuple[Bank, list[int], list[int]]] = {}
+        by_bank: dict[int, tuple[Bank, list[int], list[int]]] = {}
         for env in envs:
             bank, row = self.seat(env)
-            _, rows, places = found.setdefault(id(bank), (bank, [], []))
+            _, rows, places = by_bank.setdefault(id(bank), (bank, [], []))
             rows.append(row)
             places.append(env)
-        return [(bank, np.array(rows), np.array(places)) for bank, rows, places in found.values()]
+        return [(bank, np.array(rows), np.array(places)) for bank, rows, places in by_bank.values()]
 
     def _prepare(self) -> None:
         """Draw next trials of some environments that have none; put them into a bank once there are enough."""

@@ -176,6 +176,6 @@ class TrafficParallelVectorEnv:
 
     def _trials(self, envs: Iterable[int]) -> Any:
         some = list(envs)
-        found: Any = np.empty(len(some), dtype=object)
-        found[:] = [self.fleet.instance(env) for env in some]
-        return found
+        trials: Any = np.empty(len(some), dtype=object)
+        trials[:] = [self.fleet.instance(env) for env in some]
+        return trials

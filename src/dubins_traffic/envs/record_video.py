@@ -61,23 +61,23 @@ class RecordVideo(gymnasium.Wrapper[Any, Any, Any, Any]):
     def reset(self, **given: Any) -> tuple[Any, dict[str, Any]]:
         """Begin an episode, and its video."""
         self._finish()
-        found = self.env.reset(**given)
+        begun = self.env.reset(**given)
         self._episode += 1
         if self._wanted is None or self._wanted(self._episode):
             image = self._painted()
             fps = float(self.env.metadata.get("render_fps", 30.0))
             self._video = Video(self._draft, SUFFIX, fps, (image.shape[1], image.shape[0]))
             self._video.add(image)
-        return found
+        return begun
 
     def step(self, action: Any) -> tuple[Any, SupportsFloat, bool, bool, dict[str, Any]]:
         """Make a step, and paint it."""
-        found = self.env.step(action)
+        stepped = self.env.step(action)
         if self._video is not None:
             self._video.add(self._painted())
-            if found[2] or found[3]:
+            if stepped[2] or stepped[3]:
                 self._finish()
-        return found
+        return stepped
 
     def close(self) -> None:
         """Finish the video of the episode under way, and close the environment."""

@@ -196,8 +196,8 @@ class TrafficVectorEnv(VectorEnv[Any, Any, Any]):
             raise DubinsTrafficError(f"{name}: acts on all environments at once: call it on the vector environment")
         if name == "trial":
             return tuple(self.fleet.instance(env) for env in range(self.num_envs))
-        found = getattr(self, name)
-        value: Any = found(*args, **kwargs) if callable(found) else found
+        attribute = getattr(self, name)
+        value: Any = attribute(*args, **kwargs) if callable(attribute) else attribute
         return value if name == "render" and value is not None else (value,) * self.num_envs
 
     def get_attr(self, name: str) -> tuple[Any, ...]:

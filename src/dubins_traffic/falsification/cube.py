@@ -43,11 +43,11 @@ class Cube:
             tables[car] = low + (high - low) * share
             exits = np.minimum(np.floor(share[:, CHOICE.EXIT] * (high[CHOICE.EXIT] + 1)), high[CHOICE.EXIT])
             tables[car][:, CHOICE.EXIT] = exits
-        found = Genome(self._drawn.base, self._drawn.root, {}, tables, self._drawn.whims)
+        genome = Genome(self._drawn.base, self._drawn.root, {}, tables, self._drawn.whims)
         lots = lots_of(self._base)
         for (car, place), share in zip(self._spots.items(), point[done:].tolist(), strict=False):
             lot = lots.places[place]
-            poses = starts_of(found, self._base)
+            poses = starts_of(genome, self._base)
             poses[car] = pose_at(lots, place, lot.low + share * (lot.high - lot.low))
-            found = started(found, self._base, poses, {car: poses[car]})
-        return found
+            genome = started(genome, self._base, poses, {car: poses[car]})
+        return genome

@@ -112,15 +112,15 @@ class Least:
 
     def cases(self, source: Source, crew: Runner) -> dict[str, Case]:
         """Return the trials as cases, by name, judged afresh; without those whose assumption does not hold."""
-        found: dict[str, Case] = {}
+        cases: dict[str, Case] = {}
         for instance in source.build([kept_case.genome for kept_case in self._kept]):
             judged = judge(instance, crew.make, crew.name)
             verdict = judged.score.verdict
             if verdict is None or verdict.assumption_broken:
                 continue
             told = replace(_story(judged.score, crew.name), tick=judged.record.instance.ticks)
-            found[f"{DONE}-{len(found) + 1}"] = Case(judged.record.instance, told)
-        return found
+            cases[f"{DONE}-{len(cases) + 1}"] = Case(judged.record.instance, told)
+        return cases
 
     def state(self) -> Any:
         """Return what a search that is resumed needs, for JSON."""
@@ -233,18 +233,18 @@ class Search:
         journal = self.archive.journal
         count = len(numbers)
         known = map(journal.known, numbers, genomes)
-        found = {k: kept for k, kept in enumerate(known) if kept is not None}
-        left = [k for k in range(count) if k not in found]
-        self.finished = self.counts.trials + len(found)
+        tried = {k: kept for k, kept in enumerate(known) if kept is not None}
+        left = [k for k in range(count) if k not in tried]
+        self.finished = self.counts.trials + len(tried)
         for part in self._crew.run([instances[k] for k in left]):
             with WHOLE:
                 came = {left[k]: result for k, result in part.items()}
                 journal.keep((numbers[k], genomes[k], result) for k, result in came.items())
-                found |= came
+                tried |= came
                 self.finished += len(part)
-            if len(found) < count:
+            if len(tried) < count:
                 self._tell()
-        return [found[k] for k in range(count)]
+        return [tried[k] for k in range(count)]
 
     def _take_all(
         self, numbers: range, genomes: Sequence[Genome], instances: Sequence[Instance], tried: Sequence[Tried]

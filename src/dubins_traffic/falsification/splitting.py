@@ -216,7 +216,7 @@ def split(
         mine = slice(k * each, (k + 1) * each)
         runs.append(Run(first[mine], Paths(paths.scores[mine], paths.margins[mine]), below, generator))
     done = len(first)
-    going = [(run, found) for run in runs if (found := run.children())]
+    going = [(run, branches) for run in runs if (branches := run.children())]
     while going:
         progress(done)
         children = [child for _, some in going for child in some]
@@ -226,7 +226,7 @@ def split(
             begun, end = end, end + len(some)
             run.replace(Paths(paths.scores[begun:end], paths.margins[begun:end]))
         done += len(children)
-        going = [(run, found) for run, _ in going if (found := run.children())]
+        going = [(run, branches) for run, _ in going if (branches := run.children())]
     progress(done)
     return [run.result() for run in runs]
 

@@ -215,9 +215,9 @@ def check_machine() -> None:
 
 def own_server() -> Path | None:
     """Return the machine's own gzserver if there is one on the path that runs and is of version 11."""
-    found = shutil.which("gzserver")
+    server = shutil.which("gzserver")
     try:
-        return None if found is None or not server_version(Path(found), None) else Path(found)
+        return None if server is None or not server_version(Path(server), None) else Path(server)
     except InputError:
         return None
 
@@ -240,10 +240,10 @@ def server_version(server: Path, root: Path | None) -> str:
     if not version:
         said = done.stderr.strip().splitlines()
         raise InputError(f"does not run here ({said[-1] if said else 'it says nothing'})", file=str(server))
-    found = version[0]
-    if not found.startswith("11."):
-        raise InputError("another Gazebo than 11", file=str(server), value=found, expected="11")
-    return found
+    number = version[0]
+    if not number.startswith("11."):
+        raise InputError("another Gazebo than 11", file=str(server), value=number, expected="11")
+    return number
 
 
 @contextlib.contextmanager

@@ -82,8 +82,8 @@ def surroundings(root: Path) -> dict[str, str]:
 
 def library_folder(root: Path) -> Path:
     """Return the folder of the libraries of this machine's kind below `root`."""
-    found = sorted((root / "usr" / "lib").glob("*-linux-gnu"))
-    return found[0] if found else root / "usr" / "lib"
+    folders = sorted((root / "usr" / "lib").glob("*-linux-gnu"))
+    return folders[0] if folders else root / "usr" / "lib"
 
 
 def place(prefix: str | os.PathLike[str] | None = None) -> Path:
@@ -119,11 +119,11 @@ def find(prefix: str | os.PathLike[str] | None = None) -> Installation:
 def read_manifest(folder: Path) -> Mapping[str, Any] | None:
     """Return the marker of the last finished installation, or None."""
     try:
-        found: Any = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
+        manifest: Any = json.loads((folder / MANIFEST).read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return None
-    usable = isinstance(found, dict) and cast("dict[str, Any]", found).get("format") == FORMAT
-    return cast("dict[str, Any]", found) if usable else None
+    usable = isinstance(manifest, dict) and cast("dict[str, Any]", manifest).get("format") == FORMAT
+    return cast("dict[str, Any]", manifest) if usable else None
 
 
 def write_manifest(folder: Path, gzserver: Path, *, own: bool, version: str) -> None:
@@ -167,10 +167,10 @@ def folder_name() -> str:
 def compiler() -> str:
     """Return the C++ compiler: that of the variable CXX, else g++; InputError if there is none."""
     name = os.environ.get("CXX") or "g++"
-    found = shutil.which(name)
-    if found is None:
+    program = shutil.which(name)
+    if program is None:
         raise InputError("no C++ compiler", field="CXX", value=name, expected="g++ 9 or newer (Debian: g++)")
-    return found
+    return program
 
 
 def build(prefix: Path, root: Path | None) -> None:

@@ -377,13 +377,13 @@ def walls(polygon: PolygonObstacle) -> list[tuple[float, float, float, float]]:
     corners = polygon.vertices
     edges = list(zip(corners, corners[1:] + corners[:1], strict=True))
     inside = math.copysign(0.5 * WALL, sum(x0 * y1 - x1 * y0 for (x0, y0), (x1, y1) in edges))
-    found: list[tuple[float, float, float, float]] = []
+    sides: list[tuple[float, float, float, float]] = []
     for (x0, y0), (x1, y1) in edges:
         length = math.hypot(x1 - x0, y1 - y0)
         left = (-(y1 - y0) / length, (x1 - x0) / length)
         middle = (0.5 * (x0 + x1) + inside * left[0], 0.5 * (y0 + y1) + inside * left[1])
-        found.append((*middle, math.atan2(y1 - y0, x1 - x0), length))
-    return found
+        sides.append((*middle, math.atan2(y1 - y0, x1 - x0), length))
+    return sides
 
 
 def _wall(name: str, x: float, y: float, yaw: float, length: float) -> tuple[Element, Element]:

@@ -173,10 +173,10 @@ class _Ros2BagWriter(BagWriter):
 def _breaches(record: Record) -> dict[int, list[tuple[int, str]]]:
     """Return the car and the rule of each breach, by frame."""
     verdict = score(record).verdict
-    names, found = record.instance.names, dict[int, list[tuple[int, str]]]()
+    names, by_tick = record.instance.names, dict[int, list[tuple[int, str]]]()
     for broken in verdict.violations if verdict is not None else ():
-        found.setdefault(broken.tick, []).append((names.index(broken.car), broken.rule))
-    return found
+        by_tick.setdefault(broken.tick, []).append((names.index(broken.car), broken.rule))
+    return by_tick
 
 
 def _latched() -> Any:

@@ -77,12 +77,12 @@ def angle(y: float, x: float) -> float:
     z = t * t
     over = z * (P0 + z * (P1 + z * (P2 + z * (P3 + z * P4))))
     under = Q0 + z * (Q1 + z * (Q2 + z * (Q3 + z * (Q4 + z))))
-    found = t + t * (over / under)
+    turn = t + t * (over / under)
     if turned:
-        found = QUARTER_PI + found
+        turn = QUARTER_PI + turn
     if y > wide:
-        found = HALF_PI - found
-    return 2.0 * HALF_PI - found if x < 0.0 else found
+        turn = HALF_PI - turn
+    return 2.0 * HALF_PI - turn if x < 0.0 else turn
 
 
 def angles(y: Floats, x: Floats) -> Floats:
@@ -96,8 +96,8 @@ def angles(y: Floats, x: Floats) -> Floats:
     z = t * t
     over = z * (P0 + z * (P1 + z * (P2 + z * (P3 + z * P4))))
     under = Q0 + z * (Q1 + z * (Q2 + z * (Q3 + z * (Q4 + z))))
-    found = t + t * (over / under)
-    found = np.where(turn, QUARTER_PI + found, found)
-    found = np.where(steep, HALF_PI - found, found)
-    found = np.where(x < 0.0, 2.0 * HALF_PI - found, found)
-    return np.where(high == 0.0, 0.0, found)
+    turned = t + t * (over / under)
+    turned = np.where(turn, QUARTER_PI + turned, turned)
+    turned = np.where(steep, HALF_PI - turned, turned)
+    turned = np.where(x < 0.0, 2.0 * HALF_PI - turned, turned)
+    return np.where(high == 0.0, 0.0, turned)

@@ -79,9 +79,9 @@ def _compiled(code: Code) -> Callable[..., Any]:
         if kind_of(value) != kinds[k]:
             raise UnfitError(f"argument {k} is of another kind than before")
         blocks: list[Any] = []
-        found = address(value, kinds[k], blocks)
+        at = address(value, kinds[k], blocks)
         kept[k] = blocks
-        return found
+        return at
 
     frame = ctypes.create_string_buffer(8 * len(kinds))
     room = code.room() or ctypes.create_string_buffer(8)

@@ -265,27 +265,27 @@ class Kernel(Generic[P, R]):
                 _listing[-1].append(Entry(self, kinds))
             return None
         try:
-            found = self._known[kinds]
+            code = self._known[kinds]
         except KeyError:
-            found = self._known[kinds] = self._sought(kinds)
-        if found is not None and not isinstance(found, Code):
-            if found.wait() if self.patient or waits() else found.is_there():
-                found = self._known[kinds] = self._sought(kinds)
-            elif found.failure:
-                say(f"{self._function.__name__} stays interpreted: {found.failure.splitlines()[-1]}")
-                found = self._known[kinds] = None
+            code = self._known[kinds] = self._sought(kinds)
+        if code is not None and not isinstance(code, Code):
+            if code.wait() if self.patient or waits() else code.is_there():
+                code = self._known[kinds] = self._sought(kinds)
+            elif code.failure:
+                say(f"{self._function.__name__} stays interpreted: {code.failure.splitlines()[-1]}")
+                code = self._known[kinds] = None
             else:
                 self._pause = monotonic() + PAUSE
-        return found if isinstance(found, Code) else None
+        return code if isinstance(code, Code) else None
 
     def _sought(self, kinds: tuple[Kind, ...]) -> Code | Waiting | None:
         if not self.has_source:
             return None
         held = library.find(sources.symbol(self.key(kinds)))
-        found = ABOVE.compiled(self, kinds) if held is None else Code(kinds, *held)
-        if isinstance(found, Code):
+        code = ABOVE.compiled(self, kinds) if held is None else Code(kinds, *held)
+        if isinstance(code, Code):
             self.is_quick = True
-        return found
+        return code
 
     @property
     def has_source(self) -> bool:

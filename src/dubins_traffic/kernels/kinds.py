@@ -195,6 +195,6 @@ def leaves(value: object, into: list[int | float]) -> None:
 
 def packed(value: object, kind: Kind) -> ctypes.Array[ctypes.c_char]:
     """Return the block of an array or tuple; it is valid as long as the value is kept."""
-    found: list[int | float] = []
-    leaves(value, found)
-    return ctypes.create_string_buffer(struct.pack("@" + letters(kind), *found))
+    numbers: list[int | float] = []
+    leaves(value, numbers)
+    return ctypes.create_string_buffer(struct.pack("@" + letters(kind), *numbers))

@@ -35,13 +35,13 @@ def levels() -> tuple[str, ...]:
     InputError
         If the environment variable names no level.
     """
-    found = _machines()
+    named = _machines()
     asked = os.environ.get(LEVEL)
     if not asked:
-        return found
+        return named
     if asked not in LEVELS:
         raise InputError("no such level", file=LEVEL, value=asked, expected=", ".join(LEVELS))
-    return tuple(name for name in found if LEVELS.index(name) <= LEVELS.index(asked))
+    return tuple(name for name in named if LEVELS.index(name) <= LEVELS.index(asked))
 
 
 def level() -> str:
@@ -52,8 +52,8 @@ def level() -> str:
     InputError
         If the environment variable names no level.
     """
-    found = levels()
-    return os.environ.get(LEVEL) or (found[0] if found else "")
+    named = levels()
+    return os.environ.get(LEVEL) or (named[0] if named else "")
 
 
 def _machines() -> tuple[str, ...]:
@@ -61,12 +61,12 @@ def _machines() -> tuple[str, ...]:
     if not sys.platform.startswith("linux") or platform.machine() != "x86_64":
         return ()
     has = _features()
-    found: list[str] = []
+    machines: list[str] = []
     for name, adds in FEATURES.items():
         if not set(adds.split()) <= has:
             break
-        found.insert(0, name)
-    return tuple(found)
+        machines.insert(0, name)
+    return tuple(machines)
 
 
 def _features() -> set[str]:

@@ -56,9 +56,9 @@ class Library:
 def find(symbol: str) -> tuple[Kind, int] | None:
     """Return the kind of a kernel's answer and the address of its function, of the first library that has it."""
     for library in libraries():
-        found = library.find(symbol)
-        if found is not None:
-            return found
+        held = library.find(symbol)
+        if held is not None:
+            return held
     return None
 
 
@@ -67,11 +67,11 @@ def libraries() -> tuple[Library, ...]:
     """Return the library in the package, and the one that the user has built, as far as there are any that fit."""
     if not levels():
         return ()
-    found = [_best(IN_PACKAGE)]
+    loaded = [_best(IN_PACKAGE)]
     folder = base_folder() / BUILT
     if os.environ.get(TIER) == KEPT or is_private(folder):
-        found.append(_best(folder))
-    return tuple(library for library in found if library is not None)
+        loaded.append(_best(folder))
+    return tuple(library for library in loaded if library is not None)
 
 
 def _best(folder: Path) -> Library | None:
@@ -81,9 +81,9 @@ def _best(folder: Path) -> Library | None:
             text = (folder / f"{name}.json").read_bytes()
         except OSError:
             continue
-        found = _loaded(folder, text)
-        if found is not None:
-            return found
+        loaded = _loaded(folder, text)
+        if loaded is not None:
+            return loaded
     return None
 
 

@@ -131,8 +131,8 @@ class Table(np.ndarray[Any, Any]):
         except KeyError:
             return self._find(place)
         except TypeError:
-            found = super().__getitem__(place)
-            return found.view(type(self)) if found.base is None else found
+            part = super().__getitem__(place)
+            return part.view(type(self)) if part.base is None else part
 
     def copy(self, order: Any = "C") -> Any:
         """Return a table of the same values on memory of its own."""
@@ -154,23 +154,23 @@ class Table(np.ndarray[Any, Any]):
 
     def _find(self, place: Any) -> Any:
         plain = self.plain
-        found: Any
+        part: Any
         if plain is not None and type(place) is int and plain.ndim == 1 and 0 <= place < len(plain):
-            found = self.KIND(plain, place * plain.strides[0])
+            part = self.KIND(plain, place * plain.strides[0])
         else:
-            found = self._look_up(plain, place)
+            part = self._look_up(plain, place)
         if plain is not None and len(self.known) < MOST_KNOWN:
             if not self.known:
                 self.known = {}
-            self.known[place] = found
-        return found
+            self.known[place] = part
+        return part
 
     def _look_up(self, plain: npt.NDArray[Any] | None, place: Any) -> Any:
-        found = super().__getitem__(place) if plain is None else plain[place]
+        part = super().__getitem__(place) if plain is None else plain[place]
         if isinstance(place, str):
-            return found.view(np.ndarray)
-        if not isinstance(found, np.void):
-            return found.view(type(self))
+            return part.view(np.ndarray)
+        if not isinstance(part, np.void):
+            return part.view(type(self))
         axes = cast(tuple[int, ...], place if isinstance(place, tuple) else (place,))
         far = sum(int(number) * step for number, step in zip(axes, self.strides, strict=True))
         return self.KIND(self if plain is None else plain, far)

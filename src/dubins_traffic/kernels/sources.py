@@ -77,14 +77,14 @@ def symbol(key: str) -> str:
 
 def imported(file: Path) -> set[Path]:
     """Return `file` and all files of the package that it imports, over any number of steps."""
-    found = {file}
+    files = {file}
     waiting = [file]
     while waiting:
         for other in _imports(waiting.pop()):
-            if other not in found:
-                found.add(other)
+            if other not in files:
+                files.add(other)
                 waiting.append(other)
-    return found
+    return files
 
 
 @cache
@@ -97,9 +97,9 @@ def _text_of(file: Path) -> tuple[bytes, tuple[bytes, ...]]:
 @cache
 def _imports(file: Path) -> frozenset[Path]:
     """Return the modules that a file imports; of a package from which it imports anything, all modules in it."""
-    found: set[Path] = set()
+    files: set[Path] = set()
     for name in _text_of(file)[1]:
         place = PACKAGE.joinpath(*name.decode().split("."))
         module = place.with_suffix(".py")
-        found.update([module] if module.is_file() else place.glob("*.py"))
-    return frozenset(found - KEEPERS)
+        files.update([module] if module.is_file() else place.glob("*.py"))
+    return frozenset(files - KEEPERS)

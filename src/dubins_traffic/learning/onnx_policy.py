@@ -87,17 +87,17 @@ class OnnxPolicy:
     def act(self, seen: npt.NDArray[Any]) -> Floats:
         """Return the action, shares (-1 to 1) of the largest speed and yaw rate, (2,), for the input `seen`, (V,)."""
         given = np.asarray(seen, dtype=self._kind).reshape(self._shape)
-        found = np.asarray(self._session.run(None, {self._input: given})[0]).ravel()
+        output = np.asarray(self._session.run(None, {self._input: given})[0]).ravel()
         choices = self._choices
-        if np.issubdtype(found.dtype, np.integer):
-            if len(found) == 1 and 0 <= found[0] < len(choices):
-                return choices[found[0]]
-        elif len(found) == len(choices):
-            return choices[found.argmax()]
-        elif len(found) == 2:
-            return np.clip(found.astype(np.float64), -1.0, 1.0)
+        if np.issubdtype(output.dtype, np.integer):
+            if len(output) == 1 and 0 <= output[0] < len(choices):
+                return choices[output[0]]
+        elif len(output) == len(choices):
+            return choices[output.argmax()]
+        elif len(output) == 2:
+            return np.clip(output.astype(np.float64), -1.0, 1.0)
         expected = f"two numbers, {len(choices)} numbers, or an integer from 0 to {len(choices) - 1}"
-        raise InputError("not an action", field="output", value=found.tolist()[:4], expected=expected)
+        raise InputError("not an action", field="output", value=output.tolist()[:4], expected=expected)
 
     def _check_action(self) -> None:
         """Refuse a model that returns no action where all inputs are zero."""
@@ -226,12 +226,12 @@ def _choices(said: dict[str, str]) -> Floats:
 def _listed(said: dict[str, str], name: str, usual: str) -> list[Any]:
     """Return a property that is a JSON list."""
     try:
-        found = json.loads(said.get(name, usual))
+        listed = json.loads(said.get(name, usual))
     except ValueError:
-        found = None
-    if not isinstance(found, list):
+        listed = None
+    if not isinstance(listed, list):
         raise InputError("not a list", field=name, value=said[name][:80], expected="a JSON list")
-    return cast("list[Any]", found)
+    return cast("list[Any]", listed)
 
 
 def _line(error: Exception) -> str:

@@ -149,8 +149,8 @@ def load(path: str | Path) -> Policy:
     try:
         if Path(path).stat().st_size > MOST:
             raise InputError("too large", file=str(path), expected=f"at most {MOST} bytes")
-        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as found:
-            arrays = {name: found[name] for name in found.files if name != "format"}
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
+            arrays = {name: kept[name] for name in kept.files if name != "format"}
         return _policy(arrays)
     except InputError as error:
         raise error.within(file=str(path)) from None
@@ -173,8 +173,8 @@ def _policy(arrays: Mapping[str, Any]) -> Policy:
 
 def _format(path: str | Path) -> str:
     try:
-        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as found:
-            return str(found["format"]) if "format" in found else ""
+        with Path(path).open("rb") as stream, np.load(stream, allow_pickle=False) as kept:
+            return str(kept["format"]) if "format" in kept else ""
     except _DAMAGED:
         return ""
 

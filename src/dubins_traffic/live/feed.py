@@ -157,8 +157,8 @@ class Feed:
             marks.append(visit_mark(instance.problem, tick / instance.problem.rate, at))
         self._at = at
         if self._referee is not None:
-            found = self._referee.update(tick, state, [contacts]) if tick else self._referee.reset(state)
-            marks += breach_marks(instance, [violation_of(instance, breach) for breach in found[0]])
+            breaches = self._referee.update(tick, state, [contacts]) if tick else self._referee.reset(state)
+            marks += breach_marks(instance, [violation_of(instance, breach) for breach in breaches[0]])
         return marks
 
     def _pass_time(self, tick: int) -> None:

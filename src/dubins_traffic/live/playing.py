@@ -71,9 +71,9 @@ def play(
     names = ", ".join(RIVALS[:-1])
     feed.tell({"kind": "places", "rows": [], "sentence": f"{names} and {RIVALS[-1]} are driving the same trial ..."})
     scores = [result.score, *(run_trial(instance, name, sketch=False).score for name in RIVALS)]
-    found = standings(scores)
-    feed.tell({"kind": "places", "rows": [_row(standing) for standing in found], "sentence": sentence(found)})
-    return result, found
+    ranked = standings(scores)
+    feed.tell({"kind": "places", "rows": [_row(standing) for standing in ranked], "sentence": sentence(ranked)})
+    return result, ranked
 
 
 def standings(scores: Sequence[Score]) -> list[Standing]:

@@ -43,10 +43,10 @@ class Stepper:
     def step(self, number: int, letter: Letter) -> Moves:
         """Return what is left of obligation `number` after `letter`."""
         key = number, letter
-        found = self._steps.get(key)
-        if found is None:
-            found = self._steps[key] = self._step(self.table.nodes[number], number, letter)
-        return found
+        moves = self._steps.get(key)
+        if moves is None:
+            moves = self._steps[key] = self._step(self.table.nodes[number], number, letter)
+        return moves
 
     def step_all(self, numbers: Iterable[int], letter: Letter) -> Moves:
         """Return what is left of several obligations after `letter`."""
@@ -104,10 +104,10 @@ class Stepper:
     def implies(self, one: Atom, other: Atom) -> bool:
         """Say whether one obligation contains another, as far as their form shows it."""
         key = one, other
-        found = self._implied.get(key)
-        if found is None:
-            found = self._implied[key] = self._implies(one, other)
-        return found
+        implied = self._implied.get(key)
+        if implied is None:
+            implied = self._implied[key] = self._implies(one, other)
+        return implied
 
     def _implies(self, one: Atom, other: Atom) -> bool:
         if one >> 2 == other >> 2:
@@ -223,30 +223,30 @@ class Emptiness:
 
     def _steady(self, number: int, letter: Letter, known: dict[int, bool]) -> bool:
         """Return the value of an obligation on the word that repeats one letter."""
-        found = known.get(number)
-        if found is None:
+        steady = known.get(number)
+        if steady is None:
             node = self._stepper.table.nodes[number]
             if node.kind in ("test", "past"):
                 values = letter.tests if node.kind == "test" else letter.past
-                found = values[node.first] == node.strong
+                steady = values[node.first] == node.strong
             elif node.kind in ("and", "or"):
                 parts = (self._steady(part, letter, known) for part in node.parts)
-                found = all(parts) if node.kind == "and" else any(parts)
+                steady = all(parts) if node.kind == "and" else any(parts)
             else:
-                found = self._steady(node.parts[-1], letter, known) if node.parts else node.kind == "true"
-            known[number] = found
-        return found
+                steady = self._steady(node.parts[-1], letter, known) if node.parts else node.kind == "true"
+            known[number] = steady
+        return steady
 
     def _edges(self, state: SoughtState) -> list[Edge]:
         memory, numbers = state
-        found: dict[Edge, None] = {}
+        edges: dict[Edge, None] = {}
         table = self._stepper.table
         for tests in self._outcomes:
             letter, after = table.letter(tests, memory)
             for move in self._stepper.step_all(sorted(numbers), letter):
                 put_off = frozenset(atom >> 2 for atom in move if atom & PUT_OFF)
-                found[(after, frozenset(atom >> 2 for atom in move)), put_off] = None
-        return list(found)
+                edges[(after, frozenset(atom >> 2 for atom in move)), put_off] = None
+        return list(edges)
 
     def _search(self, start: SoughtState) -> None:
         """Tarjan's algorithm from `start`, without recursion; settles every state that it meets."""
@@ -476,10 +476,10 @@ class _Builder:
         return state
 
     def _verdict(self, state: State) -> int:
-        found = self._verdicts.get(state)
-        if found is None:
-            found = self._verdicts[state] = self._judged(state)
-        return found
+        verdict = self._verdicts.get(state)
+        if verdict is None:
+            verdict = self._verdicts[state] = self._judged(state)
+        return verdict
 
     def _judged(self, state: State) -> int:
         memory, left = state
@@ -517,9 +517,9 @@ class _Builder:
     def _replace(self, number: int, kindly: bool) -> int:
         """Return an obligation without clocks that is implied by this one (`kindly`) or implies it."""
         key = number, kindly
-        found = self._bounds.get(key)
-        if found is not None:
-            return found
+        replaced = self._bounds.get(key)
+        if replaced is not None:
+            return replaced
         node = self._table.nodes[number]
         parts = tuple(self._replace(part, kindly) for part in node.parts)
         if node.kind in ("and", "or"):
@@ -533,8 +533,8 @@ class _Builder:
             elif (node.kind == "until") != kindly:
                 self._bounds[key] = parts[1]
                 return parts[1]
-        found = self._bounds[key] = self._table.node(changed)
-        return found
+        replaced = self._bounds[key] = self._table.node(changed)
+        return replaced
 
 
 def _reduced(table: Table, letter: Ints, target: Ints, reset: Ints, verdict: Ints) -> Automaton:

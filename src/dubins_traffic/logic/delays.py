@@ -101,10 +101,10 @@ def delayed(part: Formula, period: float) -> tuple[tuple[Formula, ...], Delayed]
         name += "_"
     goal = make(later[0].op, later[0].args, bounds=span)
     formula = always(implies(prop(name), goal))
-    found = Delayed(_not_any(rest), low, later[0].op is not Op.G, name, formula)
+    late = Delayed(_not_any(rest), low, later[0].op is not Op.G, name, formula)
     if later[0].op is not Op.U:
-        return (), found
-    return (always(disj(*rest, always(later[0].args[0], (0.0, (low - 1) * period)))),), found
+        return (), late
+    return (always(disj(*rest, always(later[0].args[0], (0.0, (low - 1) * period)))),), late
 
 
 def _not_any(items: tuple[Formula, ...]) -> Formula:

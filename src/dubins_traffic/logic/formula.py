@@ -176,10 +176,10 @@ def make(op: Op, args: tuple[Formula, ...] = (), name: str = "", bounds: Bounds 
     """
     key = (op, args, name, bounds)
     with _lock:
-        found = _known.get(key)
-        if found is None:
-            found = _known[key] = _new(op, args, name, bounds)
-        return found
+        made = _known.get(key)
+        if made is None:
+            made = _known[key] = _new(op, args, name, bounds)
+        return made
 
 
 def _new(op: Op, args: tuple[Formula, ...], name: str, bounds: Bounds | None) -> Formula:

@@ -153,12 +153,12 @@ def parts(formula: Formula) -> tuple[Formula, ...]:
     split = dict.fromkeys(_split(formula, True))
     plain = [part for part in split if not any(inner.op in FUTURE | PAST for inner in subformulas(part))]
     if plain and len(propositions(conj(*plain))) <= MAX_PROPOSITIONS:
-        found = (conj(*plain), *(part for part in split if part not in plain))
+        conjuncts = (conj(*plain), *(part for part in split if part not in plain))
     else:
-        found = tuple(split)
-    if len(found) > MAX_PARTS:
-        raise FormulaError("too many parts", value=len(found), expected=f"at most {MAX_PARTS} conjuncts")
-    return found
+        conjuncts = tuple(split)
+    if len(conjuncts) > MAX_PARTS:
+        raise FormulaError("too many parts", value=len(conjuncts), expected=f"at most {MAX_PARTS} conjuncts")
+    return conjuncts
 
 
 def _split(formula: Formula, positive: bool) -> list[Formula]:
@@ -179,17 +179,17 @@ def _split(formula: Formula, positive: bool) -> list[Formula]:
 
 def groups(split: Sequence[Formula]) -> list[list[Formula]]:
     """Return the parts in groups; parts of two groups have no proposition in common."""
-    found: list[tuple[set[str], list[Formula]]] = []
+    joined: list[tuple[set[str], list[Formula]]] = []
     for part in split:
         names, members = set(propositions(part)), [part]
         apart: list[tuple[set[str], list[Formula]]] = []
-        for other, others in found:
+        for other, others in joined:
             if names & other:
                 names, members = names | other, others + members
             else:
                 apart.append((other, others))
-        found = [*apart, (names, members)]
-    return [members for _, members in found]
+        joined = [*apart, (names, members)]
+    return [members for _, members in joined]
 
 
 def together(group: Sequence[Formula], period: float) -> Automaton | None:
@@ -198,8 +198,8 @@ def together(group: Sequence[Formula], period: float) -> Automaton | None:
     names = propositions(formula)
     if len(names) > MAX_PROPOSITIONS:
         return None
-    found = _together(renamed(formula, _plain(names)), period)
-    return None if found is None else replace(found, names=names)
+    joint = _together(renamed(formula, _plain(names)), period)
+    return None if joint is None else replace(joint, names=names)
 
 
 @lru_cache(maxsize=1024)
@@ -236,10 +236,10 @@ def compiled(formula: Formula, period: float, unroll: int = UNROLL) -> Automaton
     """
     names = propositions(formula)
     try:
-        found = _compiled(renamed(formula, _plain(names)), period, unroll)
+        made = _compiled(renamed(formula, _plain(names)), period, unroll)
     except FormulaError as error:
         raise FormulaError(f"{error.problem}, in {_short(formula)}", **error.context) from None
-    return replace(found, names=names)
+    return replace(made, names=names)
 
 
 @lru_cache(maxsize=1024)
@@ -343,9 +343,9 @@ class Monitors:
             return
         except FormulaError as error:
             refused = error
-        found = delayed(part, period)
-        if found is not None:
-            others, late = found
+        split_off = delayed(part, period)
+        if split_off is not None:
+            others, late = split_off
             if late.length > LONGEST_DELAY:
                 raise FormulaError(
                     "begins too late", value=late.length, expected=f"at most {LONGEST_DELAY} ticks from now"

@@ -177,11 +177,11 @@ class Table:
 
     def node(self, node: Node) -> int:
         """Return the number of `node`."""
-        found = self._number.get(node)
-        if found is None:
-            found = self._number[node] = len(self.nodes)
+        number = self._number.get(node)
+        if number is None:
+            number = self._number[node] = len(self.nodes)
             self.nodes.append(node)
-        return found
+        return number
 
     def add(self, formula: Formula) -> None:
         """Make `formula` the root.
@@ -216,9 +216,9 @@ class Table:
 
     def dual(self, number: int) -> int:
         """Return the negation of an obligation."""
-        found = self._dual.get(number)
-        if found is not None:
-            return found
+        dual = self._dual.get(number)
+        if dual is not None:
+            return dual
         node = self.nodes[number]
         other = {"true": "false", "and": "or", "until": "release"}
         other |= {value: key for key, value in other.items()}
@@ -227,17 +227,17 @@ class Table:
         changed = node._replace(kind=other.get(node.kind, node.kind), parts=parts, strong=strong)
         if node.kind in ("and", "or"):
             changed = changed._replace(parts=tuple(sorted(parts)))
-        found = self.node(changed)
-        self._dual[number], self._dual[found] = found, number
-        return found
+        dual = self.node(changed)
+        self._dual[number], self._dual[dual] = dual, number
+        return dual
 
     def _build(self, formula: Formula, positive: bool) -> int:
         """Return the obligation that `formula`, or its negation, holds."""
         key = formula, positive
-        found = self._built.get(key)
-        if found is None:
-            found = self._built[key] = self._new(formula, positive)
-        return found
+        number = self._built.get(key)
+        if number is None:
+            number = self._built[key] = self._new(formula, positive)
+        return number
 
     def _new(self, formula: Formula, positive: bool) -> int:
         op, args = formula.op, formula.args

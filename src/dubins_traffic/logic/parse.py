@@ -119,10 +119,10 @@ def place_of(text: str, name: str) -> tuple[int, int]:
 
     ValueError if it does not stand there.
     """
-    found = re.search(rf"(?<![A-Za-z0-9_]){re.escape(name)}(?![A-Za-z0-9_])", text)
-    if found is None:
+    match = re.search(rf"(?<![A-Za-z0-9_]){re.escape(name)}(?![A-Za-z0-9_])", text)
+    if match is None:
         raise ValueError(f"no {name!r} in {text!r}")
-    return _place(text, found.start())
+    return _place(text, match.start())
 
 
 class _Parser:
@@ -180,13 +180,13 @@ class _Parser:
                 self._pending.append(_Pending(token, op, _TIGHTEST, self._bounds(op)))
             else:
                 break
-        found = _CONSTANTS.get(token.text)
-        if found is None:
+        constant = _CONSTANTS.get(token.text)
+        if constant is None:
             if token.kind != "word" or token.text in RESERVED:
                 self._unexpected(_OPERAND)
-            found = prop(token.text)
+            constant = prop(token.text)
         self._take()
-        self._parts.append(found)
+        self._parts.append(constant)
 
     def _operator(self) -> None:
         token = self._ahead()
@@ -284,9 +284,9 @@ class _Parser:
             self._fail("ends too early", token.start, None, expected)
         self._fail("unexpected", token.start, token.text, expected)
 
-    def _fail(self, problem: str, place: int, found: str | None, expected: str) -> NoReturn:
+    def _fail(self, problem: str, place: int, read: str | None, expected: str) -> NoReturn:
         line, column = _place(self._text, place)
-        what = problem if found is None else f"{problem} '{found}'"
+        what = problem if read is None else f"{problem} '{read}'"
         raise FormulaError(what, line=line, column=column, file=self._file, expected=expected)
 
 

@@ -388,12 +388,12 @@ def written_out(formula: Formula) -> Formula:
                 expected=f"at most {MAX_NEXT} ticks: a longer period, or a format that counts",
             )
         (arg,) = part.args
-        found = arg
+        changed = arg
         for _ in range(high - low):
-            found = (disj if part.op is Op.F else conj)(arg, next_(found))
+            changed = (disj if part.op is Op.F else conj)(arg, next_(changed))
         for _ in range(low):
-            found = next_(found)
-        return found
+            changed = next_(changed)
+        return changed
 
     return mapped(formula, change)
 

@@ -199,8 +199,8 @@ def _until(first: Floats, last: Floats, beyond: float) -> Floats:
 def _eventually(signal: Floats, span: tuple[int, ...] | None, beyond: float) -> Floats:
     """Return the greatest value at the frames from t + a to t + b; windows are doubled until they are long enough."""
     if span is None:
-        found = np.maximum.accumulate(signal[..., ::-1], axis=-1)[..., ::-1]
-        return np.maximum(found, beyond)
+        latest = np.maximum.accumulate(signal[..., ::-1], axis=-1)[..., ::-1]
+        return np.maximum(latest, beyond)
     low, high = span
     wanted = min(high - low + 1, signal.shape[-1] + 1)
     width, best = 1, signal

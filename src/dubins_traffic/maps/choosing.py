@@ -30,8 +30,8 @@ class Chooser:
             lambda road: not road.closed,
             lambda _: True,
         )
-        found = ([k for k, road in enumerate(roads) if kind(road)] for kind in kinds)
-        base = next(numbers for numbers in found if numbers)
+        of_kinds = ([k for k, road in enumerate(roads) if kind(road)] for kind in kinds)
+        base = next(numbers for numbers in of_kinds if numbers)
         self._others = sorted(set(range(len(roads))) - set(base))
         self._groups: dict[int, list[int]] = {}
         self._group_of: dict[int, int] = {}
@@ -69,10 +69,10 @@ def _groups(roads: Sequence[Road], numbers: list[int]) -> list[list[int]]:
     union = Union[str]()
     for k in numbers:
         union.join((roads[k].first, roads[k].last))
-    found: dict[str, list[int]] = {}
+    groups: dict[str, list[int]] = {}
     for k in numbers:
-        found.setdefault(union.root(roads[k].first), []).append(k)
-    return list(found.values())
+        groups.setdefault(union.root(roads[k].first), []).append(k)
+    return list(groups.values())
 
 
 class _Joining:
@@ -99,7 +99,7 @@ class _Joining:
 
     def to(self, held: list[int]) -> list[int]:
         """Return the roads of the groups that are worth it, and those that join them to `held`."""
-        found: list[int] = []
+        path: list[int] = []
         self._hold(held)
         while (name := self._next()) is not None:
             group = self._groups[self._owner[name]]
@@ -107,8 +107,8 @@ class _Joining:
                 del self._owner[end]
             new = [*self._way(name), *group]
             self._hold(new)
-            found += new
-        return found
+            path += new
+        return path
 
     def _ends(self, numbers: list[int]) -> set[str]:
         return {end for k in numbers for end in (self._roads[k].first, self._roads[k].last)}

@@ -86,14 +86,14 @@ class CommonRoad(WrittenFormat):
 def _lanelet(reader: Reader, element: Element, known: Collection[str], stopping: set[str]) -> Lanelet:
     left, right = (_bound(reader, element, side) for side in ("leftBound", "rightBound"))
     neighbour = {"adjacentLeft": "opposite", "adjacentRight": "same"}
-    found: dict[str, str | None] = {}
+    ends: dict[str, str | None] = {}
     for tag, direction in neighbour.items():
         other = element.find(tag)
         right_way = other is not None and other.get("drivingDir") == direction
-        found[tag] = _reference(reader, element, other, known) if other is not None and right_way else None
+        ends[tag] = _reference(reader, element, other, known) if other is not None and right_way else None
     following = tuple(_reference(reader, element, each, known) for each in element.findall("successor"))
     stops = any(each.get("ref") in stopping for each in element.iter("trafficSignRef"))
-    return Lanelet(left, right, found["adjacentLeft"], found["adjacentRight"], following, stops)
+    return Lanelet(left, right, ends["adjacentLeft"], ends["adjacentRight"], following, stops)
 
 
 def _reference(reader: Reader, lanelet: Element, element: Element, known: Collection[str]) -> str:

@@ -43,11 +43,11 @@ class Draft:
 
     def ends(self) -> dict[str, list[tuple[int, bool]]]:
         """Return which strands meet at each junction, and whether each begins there."""
-        found: dict[str, list[tuple[int, bool]]] = {}
+        by_place: dict[str, list[tuple[int, bool]]] = {}
         for s, strand in enumerate(self.strands):
-            found.setdefault(strand.first, []).append((s, True))
-            found.setdefault(strand.last, []).append((s, False))
-        return found
+            by_place.setdefault(strand.first, []).append((s, True))
+            by_place.setdefault(strand.last, []).append((s, False))
+        return by_place
 
 
 class Drafter:

@@ -63,9 +63,9 @@ class ForeignFormat(ABC):
 
         See `maps.reduction.reduction`.
         """
-        found = self.read_map(text, file)
-        found = found if part is None else part_of(found, part, file)
-        return reduction(found, settings, file, own_lanes=own_lanes)
+        drawn = self.read_map(text, file)
+        drawn = drawn if part is None else part_of(drawn, part, file)
+        return reduction(drawn, settings, file, own_lanes=own_lanes)
 
 
 class WrittenFormat(ForeignFormat):

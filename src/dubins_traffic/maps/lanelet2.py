@@ -117,10 +117,10 @@ def _bounded(osm: Osm, relation: Element) -> _Bounded:
 
 
 def _side(osm: Osm, relation: Element, role: str) -> str:
-    found = [each.get("ref", "") for each in relation.findall("member") if each.get("role") == role]
-    if len(found) != 1 or found[0] not in osm.ways:
-        raise osm.reader.fault(f"no {role} bound", relation, found, f"one way as {role}")
-    return found[0]
+    refs = [each.get("ref", "") for each in relation.findall("member") if each.get("role") == role]
+    if len(refs) != 1 or refs[0] not in osm.ways:
+        raise osm.reader.fault(f"no {role} bound", relation, refs, f"one way as {role}")
+    return refs[0]
 
 
 def _span(one: Floats, other: Floats) -> float:
@@ -129,12 +129,12 @@ def _span(one: Floats, other: Floats) -> float:
 
 def _stopping(osm: Osm) -> set[str]:
     """Return the lanelets at whose end everybody stops."""
-    found: set[str] = set()
+    stops: set[str] = set()
     for relation in osm.relations.values():
         if tags(relation).get("subtype") == "all_way_stop":
             members = [each for each in relation.findall("member") if each.get("role") in ("yield", "lanelet")]
-            found |= {each.get("ref", "") for each in members}
-    return found
+            stops |= {each.get("ref", "") for each in members}
+    return stops
 
 
 class _Text:

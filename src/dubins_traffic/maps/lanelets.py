@@ -79,19 +79,19 @@ def _roads(lanelets: Mapping[str, Lanelet]) -> dict[str, str | None]:
     for each in lanelets.values():
         for name in each.following:
             before[name] = before.get(name, 0) + 1
-    found: dict[str, str | None] = {}
+    of_lanelet: dict[str, str | None] = {}
     taken: set[str] = set()
     for name, each in lanelets.items():
         if name in taken or name in beside:
             continue
         back = each.opposite
         if back is not None and back in lanelets and back not in taken:
-            found[name] = back
+            of_lanelet[name] = back
             taken |= {name, back}
         elif not (each.following and before.get(name) and float(along(each.left)[-1]) <= LONGEST_LINK):
-            found[name] = None
+            of_lanelet[name] = None
             taken.add(name)
-    return found
+    return of_lanelet
 
 
 def _join(union: Union[End], lanelets: Mapping[str, Lanelet], ends: Mapping[str, tuple[End, End]]) -> None:

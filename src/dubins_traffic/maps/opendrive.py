@@ -124,13 +124,13 @@ def _line(reader: Reader, road: Element) -> Floats:
 def _pieces(reader: Reader, geometry: list[Element]) -> list[Floats]:
     """Return points along the pieces of a reference line, in their order; each begins where the one before ends."""
     geometry = sorted(geometry, key=lambda each: reader.number(each, "s"))
-    found = [_piece(reader, each) for each in geometry]
-    for each, before, after in zip(geometry[1:], found[:-1], found[1:], strict=True):
+    pieces = [_piece(reader, each) for each in geometry]
+    for each, before, after in zip(geometry[1:], pieces[:-1], pieces[1:], strict=True):
         gap = float(np.hypot(*(after[0] - before[-1])))
         if gap > WIDEST_GAP:
             expected = f"one that begins within {WIDEST_GAP:g} m of there"
             raise reader.fault("not where the piece before ends", each, f"{gap:.3g} m away", expected)
-    return found
+    return pieces
 
 
 def _shifted(reader: Reader, road: Element, line: Floats) -> Floats:
@@ -186,10 +186,10 @@ def _curvature(reader: Reader, shape: Element, name: str) -> float:
 
 
 def _coefficients(reader: Reader, shape: Element, names: str, suffix: str) -> Floats:
-    found = np.array([reader.number(shape, name + suffix) for name in names])
-    if float(np.abs(found).max()) > 1e7:
-        raise reader.fault("too large", shape, found.tolist(), "coefficients in [-1e7, 1e7]")
-    return found
+    coefficients = np.array([reader.number(shape, name + suffix) for name in names])
+    if float(np.abs(coefficients).max()) > 1e7:
+        raise reader.fault("too large", shape, coefficients.tolist(), "coefficients in [-1e7, 1e7]")
+    return coefficients
 
 
 def _lanes(reader: Reader, road: Element) -> tuple[int, int, float]:

@@ -80,9 +80,9 @@ class OpenStreetMap(ForeignFormat):
         ends = {node for nodes in refs.values() for node in (nodes[0], nodes[-1])}
         cuts = ends | {node for node, count in uses.items() if count > 1}
         if not ways:
-            found = f"{count(len(osm.nodes), 'node')} and {count(len(osm.ways), 'way')}"
+            says = f"{count(len(osm.nodes), 'node')} and {count(len(osm.ways), 'way')}"
             expected = "at least one way with the tag highway of a road for cars"
-            raise InputError("no roads", file=file, value=found, expected=expected)
+            raise InputError("no roads", file=file, value=says, expected=expected)
         roads = [road for name, each in ways.items() for road in _roads(osm, name, each, refs[name], cuts)]
         stops = _stops(osm, cuts)
         junctions = {node: Junction(*osm.nodes[node], node in stops) for node in sorted(cuts)}
@@ -122,8 +122,8 @@ def _lanes(what: dict[str, str]) -> tuple[int, int, float, bool]:
 
 def _number(text: str) -> float:
     """Return the number with which a value begins, 0 if there is none."""
-    found = _NUMBER.match(text)
-    return float(found[0]) if found else 0.0
+    match = _NUMBER.match(text)
+    return float(match[0]) if match else 0.0
 
 
 def _metres(text: str) -> float:
@@ -151,13 +151,13 @@ class Osm(NamedTuple):
 
     def refs(self, way: Element) -> list[str]:
         """Return the nodes of a way; InputError if one is missing, or there are fewer than two."""
-        found = [self.reader.text(each, "ref") for each in way.findall("nd")]
-        for name in found:
+        refs = [self.reader.text(each, "ref") for each in way.findall("nd")]
+        for name in refs:
             if name not in self.nodes:
                 raise self.reader.fault("no such node", way, name, "the id of a node")
-        if len(found) < 2:
-            raise self.reader.fault("no line", way, len(found), "two nodes or more")
-        return found
+        if len(refs) < 2:
+            raise self.reader.fault("no line", way, len(refs), "two nodes or more")
+        return refs
 
     def line(self, way: Element) -> Floats:
         """Return the places of the nodes of a way."""
@@ -196,18 +196,18 @@ def _places(reader: Reader, nodes: Mapping[str, Element]) -> dict[str, tuple[flo
             )
             for name, each in given.items()
         }
-    found = {
+    places = {
         name: (_degrees(reader, each, "lat", 85.0), _degrees(reader, each, "lon", 180.0))
         for name, each in nodes.items()
     }
-    if not found:
+    if not places:
         return {}
-    first = next(iter(found.values()))
+    first = next(iter(places.values()))
     meridian = middle_meridian(first[1])
-    if any(abs(longitude - meridian) > 20.0 for _, longitude in found.values()):
+    if any(abs(longitude - meridian) > 20.0 for _, longitude in places.values()):
         raise InputError("too wide", file=reader.file, expected="a map of one town")
     x0, y0 = to_metres(*first, meridian)
-    placed = {name: to_metres(*each, meridian) for name, each in found.items()}
+    placed = {name: to_metres(*each, meridian) for name, each in places.items()}
     return {name: (x - x0, y - y0) for name, (x, y) in placed.items()}
 
 

@@ -196,16 +196,16 @@ class Contraction:
 
     def _stuck(self, numbers: Iterable[int]) -> list[int]:
         """Return those of some strands that are short, and whose ends can't become one; let these ends stay."""
-        found: list[int] = []
+        stuck: list[int] = []
         for s in numbers:
             if s in self._short:
                 first, last = self._ends(s)
                 degrees = len(self._meet[first]), len(self._meet[last])
                 inner = min(degrees) > 1 and first != last
                 if not inner or sum(degrees) - 2 > LARGEST_DEGREE:
-                    found.append(s)
-        self._stay.update(end for s in found for end in self._ends(s))
-        return found
+                    stuck.append(s)
+        self._stay.update(end for s in stuck for end in self._ends(s))
+        return stuck
 
     def _merge(self, s: int) -> set[int]:
         """Replace a strand and both its ends by one junction in its middle; return the strands that end there."""

@@ -41,10 +41,10 @@ class SumoNet(WrittenFormat):
         """Return the map in a SUMO network; InputError if the text is broken."""
         root = parse(text, "net", file)
         reader = Reader(file)
-        found = reader.unique(each for each in root.iter("junction") if each.get("type") != "internal")
+        named = reader.unique(each for each in root.iter("junction") if each.get("type") != "internal")
         junctions = {
             name: Junction(reader.number(each, "x"), reader.number(each, "y"), each.get("type") == STOP)
-            for name, each in found.items()
+            for name, each in named.items()
         }
         edges = reader.unique(each for each in root.iter("edge") if each.get("function", "normal") == "normal")
         directions = [_direction(reader, each, junctions) for each in edges.values()]

@@ -127,20 +127,20 @@ class Reader:
 
     def child(self, element: Element, tag: str) -> Element:
         """Return the first child of a name; it must be there."""
-        found = element.find(tag)
-        if found is None:
+        child = element.find(tag)
+        if child is None:
             raise InputError("missing", file=self.file, field=f"{place(element)}.{tag}", expected=f"<{tag}>")
-        return found
+        return child
 
     def unique(self, elements: Iterator[Element]) -> Mapping[str, Element]:
         """Return elements by their attribute `id`; each may stand once."""
-        found: dict[str, Element] = {}
+        by_id: dict[str, Element] = {}
         for element in elements:
             name = self.text(element, "id")
-            if name in found:
+            if name in by_id:
                 raise self.fault("stands twice", element, name, "each id once")
-            found[name] = element
-        return found
+            by_id[name] = element
+        return by_id
 
 
 def place(element: Element) -> str:

@@ -168,10 +168,10 @@ def load_config(
     """
     if isinstance(source, Mapping):
         return Configuration.from_document(source, rnd=rnd)
-    found = find_source(source)
+    text = find_source(source)
     wanted = "a trials configuration", "problem_domain, rnd, e-agents, ..."
-    document = found.document(FileKind.CONFIGURATION, *wanted)
-    return Configuration.from_document(document, found.name, found.folder, rnd)
+    document = text.document(FileKind.CONFIGURATION, *wanted)
+    return Configuration.from_document(document, text.name, text.folder, rnd)
 
 
 def find_source(name: str | os.PathLike[str]) -> Source:

@@ -121,9 +121,9 @@ def load_instance(source: str | os.PathLike[str], seed: int = 0, trial: int = 0)
     InputError
         If there is no such file, it holds something else, or something in it is wrong.
     """
-    found = read_source(source)
-    document = found.document(FileKind.INSTANCE, "a problem instance", "goals, rnd, intersection_radius, ...")
-    return instance_from_document(document, found.name, seed, trial)
+    text = read_source(source)
+    document = text.document(FileKind.INSTANCE, "a problem instance", "goals, rnd, intersection_radius, ...")
+    return instance_from_document(document, text.name, seed, trial)
 
 
 def _instance(model: InstanceModel, extra: Mapping[str, Any], seed: int, trial: int) -> Instance:

@@ -154,9 +154,9 @@ def _inner(annotation: Any) -> type[BaseModel] | None:
     if inspect.isclass(annotation) and issubclass(annotation, BaseModel):
         return annotation
     for argument in getattr(annotation, "__args__", ()):
-        found = _inner(argument)
-        if found is not None:
-            return found
+        model = _inner(argument)
+        if model is not None:
+            return model
     return None
 
 

@@ -43,9 +43,9 @@ class Source:
     def document(self, kind: FileKind, wanted: str, keys: str) -> dict[str, Any]:
         """Return the JSON object in the text; InputError unless it is of a `kind`, `wanted` in words, with `keys`."""
         document = parse_json(self.text, self.name)
-        found = detect(document, self.name)
-        if found is not kind:
-            problem = f"not {wanted} but a {found}"
+        foreign = detect(document, self.name)
+        if foreign is not kind:
+            problem = f"not {wanted} but a {foreign}"
             raise InputError(problem, file=self.name, value=sorted(document), expected=keys)
         return document
 

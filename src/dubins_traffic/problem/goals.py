@@ -82,8 +82,8 @@ def _within_reach(
         def fits(vertices: Sequence[int], count: int = count) -> bool:
             if len(vertices) < min(2, count):
                 return True  # a goal alone has a round of its own, which says nothing of rounds through more
-            found = free_round(graph, vertices)
-            return found is not None and found.length <= reach.longest
+            way = free_round(graph, vertices)
+            return way is not None and way.length <= reach.longest
 
         picks = _search(network, count, apart, order, 0.5 * reach.longest, fits)
         if picks or not count:
@@ -138,10 +138,10 @@ def _search(
 
 def _within(network: RoadNetwork, start: int, most: int) -> set[int]:
     """Return the vertices at most `most` segments from `start` along the roads, itself included."""
-    found = latest = {start}
+    reached = latest = {start}
     for _ in range(most):
-        latest = {network.lane_ends(lane)[1] for v in latest for lane in network.arms(v)} - found
+        latest = {network.lane_ends(lane)[1] for v in latest for lane in network.arms(v)} - reached
         if not latest:
             break
-        found = found | latest
-    return found
+        reached = reached | latest
+    return reached

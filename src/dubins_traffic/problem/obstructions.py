@@ -33,15 +33,15 @@ def check_obstructions(problem: Problem) -> None:
     """
     if not problem.rules or not problem.obstacles or not problem.goals:
         return
-    found = _Obstructions(problem)
+    barred = _Obstructions(problem)
     for v in problem.goal_vertices:
-        if (k := found.traps(v)) is not None:
+        if (k := barred.traps(v)) is not None:
             raise _refused(
                 k,
-                f"leaves who comes to the goal {found.name(v)} no exit as wide as a car",
+                f"leaves who comes to the goal {barred.name(v)} no exit as wide as a car",
                 "a lane out of it with the body's width and 0.1 m (blocked_gap), or more at a low rate, free beside it",
             )
-    found.check_ways(problem.goal_vertices)
+    barred.check_ways(problem.goal_vertices)
 
 
 class _Obstructions:
@@ -105,8 +105,8 @@ class _Obstructions:
     def _in_the_way(self, reached: Collection[int]) -> int:
         """Return an obstacle that bars a lane out of the intersections that are reached."""
         lanes = [lane for v in sorted(reached) for lane in self._network.arms(v)]
-        found = [self._bars(lane) for lane in lanes if self._network.lane_ends(lane)[1] not in reached]
-        return next(k for k in found if k is not None)
+        bars = [self._bars(lane) for lane in lanes if self._network.lane_ends(lane)[1] not in reached]
+        return next(k for k in bars if k is not None)
 
     def name(self, v: int) -> str:
         """Return what messages call an intersection."""

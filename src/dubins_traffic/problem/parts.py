@@ -196,10 +196,10 @@ class CarModel(Strict):
             "speed_min": bounds.speed_min,
             "turning_radius": bounds.turning_radius,
         }
-        found: dict[str, Any] = {"w": car.w, "body": shape, "bounds": limits_}
+        document: dict[str, Any] = {"w": car.w, "body": shape, "bounds": limits_}
         if car.model != _CAR.model:
-            found |= {"model": car.model, "parameters": dict(car.parameters)}
-        return found
+            document |= {"model": car.model, "parameters": dict(car.parameters)}
+        return document
 
 
 class DiscObstacleModel(Strict):

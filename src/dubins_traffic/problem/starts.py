@@ -219,8 +219,8 @@ class _Near:
         cells = self._table()
         columns = range(floor((x - reach) / self._size), ceil((x + reach) / self._size))
         rows = range(floor((y - reach) / self._size), ceil((y + reach) / self._size))
-        found = {s for column in columns for row in rows for s in cells.get((column, row), ())}
-        segments = np.array(sorted(found), dtype=np.int64)
+        near = {s for column in columns for row in rows for s in cells.get((column, row), ())}
+        segments = np.array(sorted(near), dtype=np.int64)
         return np.stack([2 * segments, 2 * segments + 1], axis=-1).ravel()
 
     def couples(self, radius: float) -> tuple[Ints, Ints]:

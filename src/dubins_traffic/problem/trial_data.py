@@ -67,17 +67,17 @@ class TrialData(Open):
         InputError
             For the first thing wrong, with its field.
         """
-        found = parse(TrialData, plain(document, file), file=file)
+        data = parse(TrialData, plain(document, file), file=file)
         try:
-            plan_agents(settings_of(found.trialconf).e_agents)
+            plan_agents(settings_of(data.trialconf).e_agents)
         except InputError as error:
             raise error.within(file=file, field="trialconf") from None
-        for k, instance in enumerate(found.instances):
+        for k, instance in enumerate(data.instances):
             try:
                 instance_from_document(instance)
             except InputError as error:
                 raise error.within(file=file, field=f"instances[{k}]") from None
-        return found
+        return data
 
     @staticmethod
     def read(source: str | os.PathLike[str]) -> TrialData:
@@ -88,9 +88,9 @@ class TrialData(Open):
         InputError
             If there is no such file, it holds something else, or something in it is wrong.
         """
-        found = read_source(source)
-        document = found.document(FileKind.TRIAL_DATA, "trial data", "version, date, trialconf, instances")
-        return TrialData.from_document(document, found.name)
+        text = read_source(source)
+        document = text.document(FileKind.TRIAL_DATA, "trial data", "version, date, trialconf, instances")
+        return TrialData.from_document(document, text.name)
 
     def to_document(self) -> dict[str, Any]:
         """Return the document."""

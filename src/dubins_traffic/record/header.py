@@ -79,10 +79,10 @@ def decode(data: bytes, file: str | None = None) -> Header:
         If it is not the header of a record, or one of a version that this package does not know.
     """
     try:
-        found: Any = json.loads(data)
+        header: Any = json.loads(data)
     except (ValueError, RecursionError) as error:
         raise RecordError("damaged header", file=file, expected="JSON") from error
-    fields = cast("dict[str, Any]", found) if isinstance(found, dict) else {}
+    fields = cast("dict[str, Any]", header) if isinstance(header, dict) else {}
     if fields.get("format") != schema.FORMAT:
         raise RecordError("not a record of a trial", file=file, expected=f"an MCAP file with {schema.HEADER}")
     if fields.get("version") != schema.VERSION:

@@ -52,9 +52,9 @@ def with_cells(rows: RoadTable, half_widths: Sequence[float]) -> RoadTable:
         item = np.zeros(total, dtype=np.int64)
     (seg_start, seg_item), (vert_start, vert_item) = (_in_order(item, *kind.T) for kind in spans)
     pave = np.full(int(np.dot(t.grid["pave_nx"], t.grid["pave_ny"])), CELL.OFF, dtype=np.int64)
-    found = t.replace(seg_start=seg_start, seg_item=seg_item, vert_start=vert_start, vert_item=vert_item, pave=pave)
-    cover(found)
-    return found
+    celled = t.replace(seg_start=seg_start, seg_item=seg_item, vert_start=vert_start, vert_item=vert_item, pave=pave)
+    cover(celled)
+    return celled
 
 
 def _in_order(item: Ints, begin: Ints, count: Ints) -> tuple[Ints, Ints]:

@@ -265,11 +265,11 @@ class Chains:
 
         Between them it leaves the chain by at most `sagitta` metres (unless an arc needs more than `FINEST` chords).
         """
-        found = [0.0]
+        marks = [0.0]
         for k in range(int(self.first[s]), int(self.first[s + 1])):
             count = self._chords(k, sagitta)
-            found += [float(self.base[k] + (j + 1) * self.length[k] / count) for j in range(count)]
-        return np.array(found)
+            marks += [float(self.base[k] + (j + 1) * self.length[k] / count) for j in range(count)]
+        return np.array(marks)
 
     def _chords(self, k: int, sagitta: float) -> int:
         """Return how many chords stand for piece k."""
@@ -280,24 +280,24 @@ class Chains:
 
 def pieces(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> list[tuple[ChainPiece, ...]]:
     """Return the pieces of each segment that bends, none for the others; an InputError names segment and corner."""
-    found: list[tuple[ChainPiece, ...]] = []
+    of_segments: list[tuple[ChainPiece, ...]] = []
     for s, (x0, y0, x1, y1) in enumerate(segments):
         bends = corners[s] if corners else ()
         try:
-            found.append(chain((x0, y0), bends, (x1, y1)) if bends else ())
+            of_segments.append(chain((x0, y0), bends, (x1, y1)) if bends else ())
         except InputError as error:
             raise error.within(field=f"segments[{s}]") from None
-    return found
+    return of_segments
 
 
 def sides(segments: Sequence[Segment], corners: Sequence[Sequence[Corner]]) -> list[Segment]:
     """Return the first and the last side of each segment's polygon: (dx, dy, dx, dy)."""
-    found: list[Segment] = []
+    chords: list[Segment] = []
     for s, (x0, y0, x1, y1) in enumerate(segments):
         bends = corners[s] if corners else ()
         (ax, ay), (bx, by) = (bends[0][:2], bends[-1][:2]) if bends else ((x1, y1), (x0, y0))
-        found.append((ax - x0, ay - y0, x1 - bx, y1 - by))
-    return found
+        chords.append((ax - x0, ay - y0, x1 - bx, y1 - by))
+    return chords
 
 
 def turned(vectors: Floats, c: float, s: float) -> Floats:

@@ -63,15 +63,15 @@ def meetings(segment: Ints) -> Ints:
     """Return the pairs (K, 2) of segments (S, 4) that meet elsewhere than at a common end; the lower number first."""
     search = finder(0, len(segment), 0)
     search.put_bars(segment[:, :2].astype(np.float64), segment[:, 2:].astype(np.float64))
-    found = search.meetings()[:, 2:]
-    return found[np.lexsort((found[:, 1], found[:, 0]))]
+    met = search.meetings()[:, 2:]
+    return met[np.lexsort((met[:, 1], met[:, 0]))]
 
 
 def _check_planar(segment: Ints) -> None:
     """Refuse segments that meet elsewhere than at common ends."""
-    found = meetings(segment)
-    if len(found):
-        earlier, later = min(found.tolist(), key=lambda pair: (pair[1], pair[0]))
+    met = meetings(segment)
+    if len(met):
+        earlier, later = min(met.tolist(), key=lambda pair: (pair[1], pair[0]))
         rows = [(int(a), int(b), int(c), int(d)) for a, b, c, d in segment]
         problem = f"{_how(segment[earlier], segment[later])} segments[{earlier}]"
         raise _fault(rows, later, problem, "roads that meet at common ends only")
@@ -79,9 +79,9 @@ def _check_planar(segment: Ints) -> None:
 
 def _check_apart(segments: Sequence[Segment], corners: Sequence[Corners]) -> None:
     """Refuse chains of lines and arcs that meet elsewhere than at common ends, and that meet themselves."""
-    found = first_crossing(segments, corners)
-    if found is not None:
-        earlier, later = found
+    pair = first_crossing(segments, corners)
+    if pair is not None:
+        earlier, later = pair
         problem = "crosses itself" if earlier == later else f"meets segments[{earlier}]"
         raise _fault(segments, later, problem, "roads that meet at common ends only")
 
@@ -139,15 +139,15 @@ def first_crossing(segments: Sequence[Segment], corners: Sequence[Corners]) -> t
     owner = [s for s, chain in enumerate(chains) for _ in chain]
     rows = [piece for chain in chains for piece in chain]
     shared = [frozenset(((row[0], row[1]), (row[2], row[3]))) for row in segments]
-    found: list[tuple[int, int]] = []
+    crossings: list[tuple[int, int]] = []
     for i, j in _candidates(rows):
         s, other = owner[i], owner[j]
         if s == other and _follow(rows[i : j + 1]):
             continue
         common = shared[s] & shared[other] if s != other else frozenset[Point]()
         if _pieces_meet(rows[i], rows[j], common):
-            found.append((min(s, other), max(s, other)))
-    return min(found, key=lambda pair: (pair[1], pair[0]), default=None)
+            crossings.append((min(s, other), max(s, other)))
+    return min(crossings, key=lambda pair: (pair[1], pair[0]), default=None)
 
 
 def _follow(row: Sequence[ChainPiece]) -> bool:

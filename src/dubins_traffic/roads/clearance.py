@@ -76,11 +76,11 @@ def _finder(points: Floats, ends: Ints, bars: Bars) -> Finder:
     return search
 
 
-def _told(found: Ints) -> Tight:
+def _told(sides: Ints) -> Tight:
     """Return what kernels have found (`roads.closeness.Hit`), in order."""
-    vertices, segments = (found[:, :2] >= 0).sum(axis=1), (found[:, 2:] >= 0).sum(axis=1)
-    short, close = found[vertices == 0, 2], found[vertices == 2, :2]
-    beside, sharp = found[(vertices == 1) & (segments == 1)], found[(vertices == 1) & (segments == 2)]
+    vertices, segments = (sides[:, :2] >= 0).sum(axis=1), (sides[:, 2:] >= 0).sum(axis=1)
+    short, close = sides[vertices == 0, 2], sides[vertices == 2, :2]
+    beside, sharp = sides[(vertices == 1) & (segments == 1)], sides[(vertices == 1) & (segments == 2)]
     return Tight(short, _distinct(close), _distinct(beside[:, [0, 2]]), sharp[:, [0, 2, 3]])
 
 
@@ -118,20 +118,20 @@ def clearance_faults(
             return faults
     if least not in network.known:
         network.known[least] = tight(points, ends, least) if network.is_straight else bent_tight(network, least)
-    found = cast(Tight, network.known[least])
-    for s in found.short.tolist():
+    narrow = cast(Tight, network.known[least])
+    for s in narrow.short.tolist():
         faults.append(_fault("too short", s, float(network.lengths[s]), f"at least {least.length:.6g} m"))
-    for v, other in _couples(found.close):
+    for v, other in _couples(narrow.close):
         s = int(np.flatnonzero((ends == v).any(axis=1))[0])
         gap = float(_norm(points[v] - points[other]))
         problem = f"intersections {list(names[v])} and {list(names[other])} are too close"
         faults.append(_fault(problem, s, gap, f"at least {least.apart:.6g} m"))
-    for v, s in _couples(found.beside):
+    for v, s in _couples(narrow.beside):
         along, left = (float(each) for each in network.lane_coordinates(2 * s, points[v]))
         gap = hypot(left, max(-along, along - float(network.lengths[s]), 0.0))
         problem = f"intersection {list(names[v])} is too close to the road"
         faults.append(_fault(problem, s, gap, f"at least {least.aside:.6g} m"))
-    for v, first, second in found.sharp.tolist():
+    for v, first, second in narrow.sharp.tolist():
         faults.append(_sharp_fault(network, v, first, second, least.cosine))
     return faults
 
@@ -188,7 +188,7 @@ def _overlaps(network: RoadNetwork, straight: float, least: float, w: float) -> 
     They are measured beyond the `straight` metres at their ends: there they may meet.
     """
     owner, along, place = _samples(network, straight, SAMPLED * w / 0.3)
-    found: dict[tuple[int, int], float] = {}
+    deepest: dict[tuple[int, int], float] = {}
     for one, other in pairs(*covered(place, place, 0.5 * least, max(least, 1e-9))):
         low, high = owner[one], owner[other]
         apart = (low != high) | (np.abs(along[one] - along[other]) >= FAR_ALONG * w)
@@ -198,12 +198,12 @@ def _overlaps(network: RoadNetwork, straight: float, least: float, w: float) -> 
         far = np.sqrt((step * step).sum(axis=-1))
         for k in np.flatnonzero(far < least - ROUNDING).tolist():
             pair = int(min(owner[first[k]], owner[second[k]])), int(max(owner[first[k]], owner[second[k]]))
-            found[pair] = min(found.get(pair, np.inf), float(far[k]))
+            deepest[pair] = min(deepest.get(pair, np.inf), float(far[k]))
     faults: list[InputError] = []
-    for low, high in sorted(found, key=lambda pair: (pair[1], pair[0])):
+    for low, high in sorted(deepest, key=lambda pair: (pair[1], pair[0])):
         s, other = (high, low) if network.bent[high] else (low, high)
         problem = "comes too close to itself" if s == other else f"comes too close to segments[{other}]"
-        faults.append(_fault(problem, s, found[low, high], f"at least {least:.6g} m between the middles of roads"))
+        faults.append(_fault(problem, s, deepest[low, high], f"at least {least:.6g} m between the middles of roads"))
     return faults
 
 

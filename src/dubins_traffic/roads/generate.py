@@ -180,9 +180,9 @@ def _draw(draws: Draws, count: int, roads: int, least: Clearances, minimum_angle
     grid = minimum_angle <= pi / 2
     largest = 0
     if not grid or roads <= ceil(GROWN_SHARE * count):
-        found, largest = sketched(draws, count, roads, least, minimum_angle)
-        if found is not None:
-            return found
+        sketch, largest = sketched(draws, count, roads, least, minimum_angle)
+        if sketch is not None:
+            return sketch
     if grid:
         return woven(draws, count, roads, least)
     problem = f"can't be placed at angles of at least {180.0 * minimum_angle / pi:.6g} degrees"

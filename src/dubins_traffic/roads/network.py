@@ -200,14 +200,14 @@ class RoadNetwork(Pictured):
         """The network in a few words: ``17 segments, 12 intersections on a 3 x 4 lattice``; metres where off it."""
         rows, columns = self.shape
         segments, points = len(self.segments), len(self.intersections)
-        found = f"{count(segments, 'segment')}, {count(points, 'intersection')}"
+        size = f"{count(segments, 'segment')}, {count(points, 'intersection')}"
         bent = sum(1 for bends in self.corners if bends)
         if self.on_lattice:
             place = f"on a {rows} x {columns} lattice"
         else:
             width, height = np.ptp(self.points, axis=0)
             place = f"on {width:.0f} x {height:.0f} m"
-        return f"{found} {place}" + (f", {bent} bent" if bent else "")
+        return f"{size} {place}" + (f", {bent} bent" if bent else "")
 
     def __deepcopy__(self, memo: object) -> RoadNetwork:
         """Return this very network, which never changes."""
@@ -365,10 +365,10 @@ class RoadNetwork(Pictured):
 
     def table(self, half_width: float) -> RoadTable:
         """Return the network as kernels read it, its roads `half_width` metres to either side (kept for next time)."""
-        found = self._tables.get(half_width)
-        if found is None:
-            found = self._tables[half_width] = with_cells(self.rows(), [half_width])
-        return found
+        known = self._tables.get(half_width)
+        if known is None:
+            known = self._tables[half_width] = with_cells(self.rows(), [half_width])
+        return known
 
     @cached_property
     def _tables(self) -> dict[float, RoadTable]:

@@ -15,12 +15,12 @@ from dubins_traffic.roads.table import RoadTable, Segment
 
 def pack_distinct(networks: Sequence[RoadNetwork], half_widths: Sequence[float]) -> tuple[RoadTable, Ints]:
     """Return the table of the distinct pairs of network and half width, and the number of each trial's pair in it."""
-    found: dict[tuple[int, float], tuple[int, RoadNetwork]] = {}
+    numbered: dict[tuple[int, float], tuple[int, RoadNetwork]] = {}
     given: list[int] = []
     for network, width in zip(networks, half_widths, strict=True):
-        number, _ = found.setdefault((id(network), width), (len(found), network))
+        number, _ = numbered.setdefault((id(network), width), (len(numbered), network))
         given.append(number)
-    packed = pack([network for _, network in found.values()], [width for _, width in found])
+    packed = pack([network for _, network in numbered.values()], [width for _, width in numbered])
     return packed, np.array(given, dtype=np.int64)
 
 

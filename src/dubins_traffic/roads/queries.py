@@ -23,9 +23,9 @@ def nearest(t: RoadTable, points: npt.ArrayLike, *, vertices: bool = False) -> t
 def coordinates(t: RoadTable, lane: int, points: npt.ArrayLike) -> tuple[Floats, Floats]:
     """Return (s, l) of points (..., 2) on a lane: metres along it, and left of the segment's centre line."""
     points = np.asarray(points, dtype=np.float64)
-    found = np.array(points.reshape(-1, 2), order="C")
-    put_coordinates(t, lane, found)
-    return found[:, 0].reshape(points.shape[:-1]), found[:, 1].reshape(points.shape[:-1])
+    flat = np.array(points.reshape(-1, 2), order="C")
+    put_coordinates(t, lane, flat)
+    return flat[:, 0].reshape(points.shape[:-1]), flat[:, 1].reshape(points.shape[:-1])
 
 
 @jit

@@ -158,8 +158,8 @@ class Sketcher:
         plan.tries, plan.left = tries, ATTEMPTS
         plan.is_growing = plan.is_whole = plan.most = 0
         set_stream(stream, draws)
-        while found := self._sketch(plan, self.tables, stream):
-            couple, order = np.zeros((found, 2), dtype=np.int64), np.zeros(found, dtype=np.int64)
+        while status := self._sketch(plan, self.tables, stream):
+            couple, order = np.zeros((status, 2), dtype=np.int64), np.zeros(status, dtype=np.int64)
             self.tables = self.tables.replace(couple=couple, order=order)
         draws.go_to(stream.drawn)
 
@@ -267,10 +267,10 @@ def _grow(plan: Plan, drawing: Sketch, stream: Stream) -> bool:
 @jit
 def _find_couples(plan: Plan, drawing: Sketch) -> int:
     """Return how many roads may be added as far as their length is concerned; write them in order, if there is room."""
-    found = 0
+    couples = 0
     for a in range(plan.spots):
         spot = drawing.spot[a]
-        begin = found
+        begin = couples
         for cell in range(9):
             column = spot.column + cell // 3 - 1
             row = spot.row + cell % 3 - 1
@@ -282,11 +282,11 @@ def _find_couples(plan: Plan, drawing: Sketch) -> int:
                     dy = other.y - spot.y
                     far = sqrt(float(dx * dx + dy * dy))
                     if plan.length <= far <= plan.longest:
-                        if found < drawing.couple.shape[0]:
-                            _insert(drawing.couple, begin, found, a, b)
-                        found += 1
+                        if couples < drawing.couple.shape[0]:
+                            _insert(drawing.couple, begin, couples, a, b)
+                        couples += 1
                 b = other.following
-    return found
+    return couples
 
 
 @jit

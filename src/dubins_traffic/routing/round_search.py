@@ -73,13 +73,13 @@ def joined(graphs: Sequence[LaneTables]) -> tuple[LaneTables, list[int], list[in
         "into_off": lanes,
         "into": lanes,
     }
-    found: dict[str, Any] = {}
+    columns: dict[str, Any] = {}
     for name in LaneTables.field_names:
         parts = [getattr(graph, name) + first for graph, first in zip(graphs, by.get(name, repeat(0)), strict=False)]
         if name.endswith("_off"):
             parts[:-1] = [part[:-1] for part in parts[:-1]]
-        found[name] = np.concatenate(parts)
-    return LaneTables(**found), lanes, places
+        columns[name] = np.concatenate(parts)
+    return LaneTables(**columns), lanes, places
 
 
 def room(goals: int, lanes: int) -> Search:

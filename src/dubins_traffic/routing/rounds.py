@@ -27,8 +27,8 @@ def round_time(network: RoadNetwork, goals: Sequence[int], speed: float) -> floa
     The round is the shortest closed route through all goals, which turns round at dead ends only; that of a single goal
     goes to the nearest other intersection and back, since that makes a visit. Turning costs nothing.
     """
-    found = free_round(lane_graph(network), goals)
-    return inf if found is None else found.length / speed
+    tour = free_round(lane_graph(network), goals)
+    return inf if tour is None else tour.length / speed
 
 
 def stages(network: RoadNetwork, goals: Sequence[int]) -> tuple[Ints, Floats]:
@@ -37,13 +37,13 @@ def stages(network: RoadNetwork, goals: Sequence[int]) -> tuple[Ints, Floats]:
     M is 0 without goals that can be reached.
     """
     graph = lane_graph(network)
-    found = find_round(graph, goals)
-    if found is None:
+    tour = find_round(graph, goals)
+    if tour is None:
         return np.zeros(0, dtype=np.int64), np.zeros((0, 0))
-    kept = graph.stages.get(found)
+    kept = graph.stages.get(tour)
     if kept is None:
-        targets = [found.lanes[place] for place in found.arrivals]
+        targets = [tour.lanes[place] for place in tour.arrivals]
         distance = np.stack([graph.distances(target) for target in targets]) + np.array(graph.length)
         kept = np.array([graph.end[target] for target in targets], dtype=np.int64), distance
-        graph.stages[found] = kept
+        graph.stages[tour] = kept
     return kept

@@ -97,27 +97,27 @@ class LaneGraph:
         """Return the metres from the end of each lane to each of some intersections, (L,); inf: there is no way."""
         far, work = np.empty(self.count), np.empty((2, self.count), dtype=np.int64)
         queue, waits = work
-        find, found = bound(metres_into), list[Floats]()
+        find, rows = bound(metres_into), list[Floats]()
         for v in intersections:
-            found.append(np.empty(self.count))
-            find(v, self.tables, found[-1], far, queue, waits)
-        return found
+            rows.append(np.empty(self.count))
+            find(v, self.tables, rows[-1], far, queue, waits)
+        return rows
 
     def distances(self, target: int, penalty: TurnCost | None = None) -> list[float]:
         """Return metres from the end of each lane to the end of the lane `target`, driving on from there."""
-        found = [inf] * self.count
-        found[target] = 0.0
+        metres = [inf] * self.count
+        metres[target] = 0.0
         heap = [(0.0, target)]
         while heap:
             far, lane = heapq.heappop(heap)
-            if far > found[lane]:
+            if far > metres[lane]:
                 continue
             for other, cost in self.before[lane]:
                 total = far + cost + (penalty(other, lane) if penalty is not None else 0.0)
-                if total < found[other]:
-                    found[other] = total
+                if total < metres[other]:
+                    metres[other] = total
                     heapq.heappush(heap, (total, other))
-        return found
+        return metres
 
     def step(self, lane: int, distances: Sequence[float], penalty: TurnCost | None = None) -> tuple[int, float]:
         """Return the next lane toward the target of `distances`, and metres to it by way of that lane (or -1, inf).
@@ -223,10 +223,10 @@ def _find_shortest(number: int, wanted: Sequence[tuple[LaneGraph, tuple[int, ...
         if not count:
             graph.rounds[goals] = None
             continue
-        found = Round(tuple((search_room.lane[:count] - lane).tolist()), tuple(search_room.arrival.tolist()), length)
+        tour = Round(tuple((search_room.lane[:count] - lane).tolist()), tuple(search_room.arrival.tolist()), length)
         distance = far[search_room.row, lane : lane + graph.count] + np.array(graph.length)
-        graph.rounds[goals] = found
-        graph.stages[found] = np.array(goals, dtype=np.int64)[search_room.row // search_room.far.shape[1]], distance
+        graph.rounds[goals] = tour
+        graph.stages[tour] = np.array(goals, dtype=np.int64)[search_room.row // search_room.far.shape[1]], distance
 
 
 def _nearest_first(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
@@ -252,15 +252,15 @@ def _nearest_first(graph: LaneGraph, goals: tuple[int, ...]) -> Round | None:
 
 def _search(graph: LaneGraph, lane: int, wanted: Callable[[int], bool]) -> tuple[list[int], float]:
     """Return the shortest route from the end of `lane` to the end of a wanted lane, and its metres."""
-    found: dict[int, float] = {}
+    metres: dict[int, float] = {}
     came: dict[int, int] = {}
     heap = [(cost, other, -1) for other, cost in graph.after[lane]]
     heapq.heapify(heap)
     while heap:
         far, at, source = heapq.heappop(heap)
-        if at in found:
+        if at in metres:
             continue
-        found[at] = far
+        metres[at] = far
         came[at] = source
         if wanted(at):
             leg = [at]
@@ -268,6 +268,6 @@ def _search(graph: LaneGraph, lane: int, wanted: Callable[[int], bool]) -> tuple
                 leg.append(came[leg[-1]])
             return leg[::-1], far
         for other, cost in graph.after[at]:
-            if other not in found:
+            if other not in metres:
                 heapq.heappush(heap, (far + cost, other, at))
     return [], inf

@@ -158,10 +158,10 @@ def _is_way_free(b: int, n: int, excused: bool, lasts: bool, tables: RefereeTabl
 def _is_goal(b: int, v: int, tables: RefereeTables) -> bool:
     """Tell whether the intersection v is a goal of trial b."""
     terms = tables.terms[b]
-    found = False
+    goal = False
     for g in range(terms.goals_begin, terms.goals_end):
-        found |= tables.log.goal[g].vertex == v
-    return found
+        goal |= tables.log.goal[g].vertex == v
+    return goal
 
 
 @jit_inline
@@ -221,12 +221,12 @@ def _lacks_room(b: int, n: int, place: RightLane, here: float, v: int, tables: R
 
 
 @jit
-def find_ways(tick: int, tables: RefereeTables, found: Any) -> None:
-    """Write into `found` (B, N) which cars have a free way ahead (E5) in frame `tick`, which has been judged."""
+def find_ways(tick: int, tables: RefereeTables, ways: Any) -> None:
+    """Write into `ways` (B, N) which cars have a free way ahead (E5) in frame `tick`, which has been judged."""
     for b in range(tables.state.count.shape[0]):
         for n in range(tables.state.count[b]):
             excused, lasts = excuse_of(b, n, tick, tables)
-            found[b, n] = _is_way_free(b, n, excused, lasts, tables)
+            ways[b, n] = _is_way_free(b, n, excused, lasts, tables)
 
 
 @jit

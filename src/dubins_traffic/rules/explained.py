@@ -108,7 +108,7 @@ def _items(lines: tuple[str, ...], place: int) -> list[list[str]]:
     while first > 0 and lines[first - 1].strip() and not _ITEM.match(lines[first]):
         first -= 1
     top = _ITEM.match(lines[first])
-    found: list[list[str]] = [[lines[first]]]
+    items: list[list[str]] = [[lines[first]]]
     for line in lines[first + 1 :]:
         item = _ITEM.match(line)
         if top is None:
@@ -118,9 +118,9 @@ def _items(lines: tuple[str, ...], place: int) -> list[list[str]]:
         if is_over and (line.strip() or top is None):
             break
         if item:
-            found.append([])
-        found[-1].append(line)
-    return found
+            items.append([])
+        items[-1].append(line)
+    return items
 
 
 def _plain(lines: list[str]) -> str:

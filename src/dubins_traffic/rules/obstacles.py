@@ -92,16 +92,16 @@ def on_bend(parts: Rows[Part], roads: RoadTable, row: int, half_width: float) ->
 
     Norm: docs/rules.md#obstacle-on-a-bend.
     """
-    segment, found, beside = roads.segment[row], list[tuple[float, ...]](), set[int]()
+    segment, spans, beside = roads.segment[row], list[tuple[float, ...]](), set[int]()
     for p in range(len(parts)):
         edge = half_width + parts[p].reach
         if bent_distance2(roads.piece, segment, parts[p].x, parts[p].y) < edge * edge:
             beside.add(parts[p].owner)
     for p in range(len(parts)):
         if parts[p].owner in beside:
-            found += _bits(parts[p], roads, row, half_width)
-    rows: Any = table(ObstaclePart, len(found))
-    for k, bit in enumerate(found):
+            spans += _bits(parts[p], roads, row, half_width)
+    rows: Any = table(ObstaclePart, len(spans))
+    for k, bit in enumerate(spans):
         rows[k] = bit
     return rows
 

@@ -196,9 +196,9 @@ class Referee:
 
     def ways(self, state: State) -> npt.NDArray[np.bool_]:
         """Return which cars are in a lane with a free way ahead (E5), (B, N), in the last frame, that of `state`."""
-        found = np.zeros(state.x.shape, dtype=np.bool_)
-        find_ways(self._tick, self.tables(state), found)
-        return found
+        ways = np.zeros(state.x.shape, dtype=np.bool_)
+        find_ways(self._tick, self.tables(state), ways)
+        return ways
 
     def tables(self, state: State) -> RefereeTables:
         """Return the tables by which the last frame was judged, that of `state`; they must not be changed."""
@@ -319,8 +319,8 @@ def breaches_of(rows: Rows[FoundBreach], x: Floats, y: Floats) -> list[Breach]:
     """Return rows of the log (K,) as breaches by cars whose centres are `x` (K,) and `y` (K,), metres."""
     numbers: list[int] = rows["rule"].tolist()
     car, tick, since, vertex, lane = (rows[name].tolist() for name in ("car", "tick", "since", "vertex", "lane"))
-    found = zip(numbers, car, tick, since, x.tolist(), y.tolist(), vertex, lane, strict=True)
-    return [Breach(RULES[rule], *about) for rule, *about in found]
+    fields = zip(numbers, car, tick, since, x.tolist(), y.tolist(), vertex, lane, strict=True)
+    return [Breach(RULES[rule], *about) for rule, *about in fields]
 
 
 def accused(contacts: Sequence[Contact]) -> list[Breach]:

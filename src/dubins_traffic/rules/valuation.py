@@ -120,10 +120,10 @@ class Valuation:
             raise ValueError(f"frame {self._next} must follow, got {frames.first}")
         self._next += len(frames)
         scene = self._scene(frames)
-        found = np.zeros((len(frames), len(self._wanted)), dtype=np.bool_)
+        values = np.zeros((len(frames), len(self._wanted)), dtype=np.bool_)
         for column, proposition in enumerate(self._wanted):
-            found[:, column] = self._value(scene, proposition)
-        return found
+            values[:, column] = self._value(scene, proposition)
+        return values
 
     def _scene(self, frames: Frames) -> _Scene:
         contacts: dict[int, list[Contact]] = {}

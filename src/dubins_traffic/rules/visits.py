@@ -94,17 +94,17 @@ def visited_place(vertex: int) -> Rows[VisitedPlace]:
 
 
 @jit
-def mark_visits(at: Ints, place: Rows[VisitedPlace], found: Ints) -> None:
-    """Write to `found` (F,) 1 for each frame in which a visit begins; `at` (F,) are the discs that hold the centre."""
+def mark_visits(at: Ints, place: Rows[VisitedPlace], visits: Ints) -> None:
+    """Write to `visits` (F,) 1 for each frame in which a visit begins; `at` (F,) are the discs that hold the centre."""
     first = place[0]
     for f in range(at.shape[0]):
         if at[f] >= 0:
             come_by(at[f], first)
-        found[f] = 1 if begins_visit(at[f] == first.vertex, first) else 0
+        visits[f] = 1 if begins_visit(at[f] == first.vertex, first) else 0
 
 
 def visits_in(at: Ints, place: Rows[VisitedPlace]) -> Ints:
     """Return for each of the next frames, (F,), 1 if a visit begins; as `mark_visits`."""
-    found = np.zeros(len(at), dtype=np.int64)
-    mark_visits(np.ascontiguousarray(at), place, found)
-    return found
+    visits = np.zeros(len(at), dtype=np.int64)
+    mark_visits(np.ascontiguousarray(at), place, visits)
+    return visits

@@ -86,14 +86,14 @@ class Vocabulary:
         FormulaError
             If the problem has no such proposition, or the names of its cars let it be read in several ways.
         """
-        found = list(dict.fromkeys(self._readings(name)))
-        if len(found) > 1:
+        readings = list(dict.fromkeys(self._readings(name)))
+        if len(readings) > 1:
             expected = "cars whose names can't be taken for other propositions"
             raise FormulaError("ambiguous proposition", value=name, expected=expected)
-        if not found:
+        if not readings:
             expected = f"one of the problem's propositions, such as {self._like(name)}"
             raise FormulaError("unknown proposition", value=name, expected=expected)
-        return found[0]
+        return readings[0]
 
     def _readings(self, name: str) -> Iterator[Proposition]:
         for word in (*OF_CAR, *(OF_JUDGED if self._judged else ())):

@@ -131,9 +131,9 @@ def carry_out(
         for errand in apart(suspect):
             if barren is not None and in_vain >= barren:
                 return
-            found = _alone(crew, errand)
-            in_vain = in_vain + 1 if found is None else 0
-            yield errand, found
+            result = _alone(crew, errand)
+            in_vain = in_vain + 1 if result is None else 0
+            yield errand, result
 
 
 def _alone(crew: Crew, errand: Errand) -> Any:

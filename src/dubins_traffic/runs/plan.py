@@ -176,11 +176,11 @@ def load_runnable(
     source: str | os.PathLike[str], *, rnd: str | os.PathLike[str] | None, seed: int
 ) -> Configuration | Instance | Record:
     """Return what `sources.load` returns, unless it is a road network, of which no trials can be run."""
-    found = load(source, rnd=rnd, seed=seed)
-    if isinstance(found, RoadNetwork):
+    loaded = load(source, rnd=rnd, seed=seed)
+    if isinstance(loaded, RoadNetwork):
         expected = "a trials configuration, a problem instance or a record"
         raise InputError("a road network can't be run", file=os.fspath(source), expected=expected)
-    return found
+    return loaded
 
 
 def _instances(jobs: Sequence[Job], seed: int) -> Callable[[int], Instance]:
@@ -207,12 +207,12 @@ def _drawn(configuration: Configuration, controller: str, trials: int, seed: int
 
 def _recorded(jobs: Sequence[Job], folder: Path, repeat: int) -> list[Job]:
     """Return each job `repeat` times, each with its record in `folder`."""
-    found: list[Job] = []
+    planned: list[Job] = []
     for job in jobs:
         for run in range(repeat):
             record = folder / name(job.trial, run if repeat > 1 else None)
-            found.append(replace(job, record=record, overwrite=record.exists()))
-    return found
+            planned.append(replace(job, record=record, overwrite=record.exists()))
+    return planned
 
 
 def _refuse(source: str, options: dict[str, object]) -> None:

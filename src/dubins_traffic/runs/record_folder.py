@@ -89,11 +89,11 @@ def claim(
     if overwrite and append:
         raise InputError("both at once", file="--overwrite, --append", expected="one of them")
     with locked(folder):
-        found = sorted(path for path in folder.glob("*.mcap") if path.is_file())
-        if found and not (overwrite or append):
-            others = f" and {len(found) - 1} more" if len(found) > 1 else ""
-            raise InputError(f"holds {found[0].name}{others}", file=str(folder), expected=WAYS)
-        ours = [path for path in found if OURS.fullmatch(path.name)]
+        records = sorted(path for path in folder.glob("*.mcap") if path.is_file())
+        if records and not (overwrite or append):
+            others = f" and {len(records) - 1} more" if len(records) > 1 else ""
+            raise InputError(f"holds {records[0].name}{others}", file=str(folder), expected=WAYS)
+        ours = [path for path in records if OURS.fullmatch(path.name)]
         if append:
             return frozenset(path.name for path in ours if _stays(path, controller, instance_of, placed))
         for path in ours:

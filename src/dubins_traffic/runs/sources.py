@@ -57,8 +57,8 @@ def load(
         configuration.
     """
     form = formats.load(map_format) if isinstance(map_format, str) else map_format
-    found = _load(source, rnd, seed, form)
-    if rnd is not None and not isinstance(found, Configuration):
+    loaded = _load(source, rnd, seed, form)
+    if rnd is not None and not isinstance(loaded, Configuration):
         raise InputError(
             "a road network can replace that of a configuration only",
             file=os.fspath(source),
@@ -66,7 +66,7 @@ def load(
             value=os.fspath(rnd),
             expected="a trials configuration",
         )
-    return found
+    return loaded
 
 
 def load_record(source: str | os.PathLike[str]) -> Record:
@@ -95,31 +95,31 @@ def _load(
         data = read_bytes(name)
         if data.startswith(MCAP_MAGIC):
             return reader.from_bytes(data, name)
-        found = source_of(data, name)
+        source_text = source_of(data, name)
     else:
-        found = find_source(source)
-    if map_format is not None and formats.sniffs(map_format, found.text):
-        return RoadNetwork.from_text(found.text, found.name, map_format)
-    if formats.is_map(found.text):
-        return RoadNetwork.from_text(found.text, found.name)
-    if found.text.lstrip()[:1] not in ("", "{", "["):
-        raise InputError("of no known kind", file=found.name, value=found.text[:20], expected=KINDS)
-    document = parse_json(found.text, found.name)
+        source_text = find_source(source)
+    if map_format is not None and formats.sniffs(map_format, source_text.text):
+        return RoadNetwork.from_text(source_text.text, source_text.name, map_format)
+    if formats.is_map(source_text.text):
+        return RoadNetwork.from_text(source_text.text, source_text.name)
+    if source_text.text.lstrip()[:1] not in ("", "{", "["):
+        raise InputError("of no known kind", file=source_text.name, value=source_text.text[:20], expected=KINDS)
+    document = parse_json(source_text.text, source_text.name)
     try:
-        kind = detect(document, found.name)
+        kind = detect(document, source_text.name)
     except InputError:
-        if (other := formats.of_other_package(found.text)) is None:
+        if (other := formats.of_other_package(source_text.text)) is None:
             raise
-        return RoadNetwork.from_text(found.text, found.name, other)
+        return RoadNetwork.from_text(source_text.text, source_text.name, other)
     match kind:
         case FileKind.NETWORK:
-            return RoadNetwork.from_document(document, found.name)
+            return RoadNetwork.from_document(document, source_text.name)
         case FileKind.CONFIGURATION:
-            return Configuration.from_document(document, found.name, found.folder, rnd)
+            return Configuration.from_document(document, source_text.name, source_text.folder, rnd)
         case FileKind.INSTANCE:
-            return instance_from_document(document, found.name, seed)
+            return instance_from_document(document, source_text.name, seed)
         case _:
-            raise InputError(f"holds {kind}", file=found.name, expected=KINDS)
+            raise InputError(f"holds {kind}", file=source_text.name, expected=KINDS)
 
 
 def _holds_record(source: str | os.PathLike[str]) -> bool:

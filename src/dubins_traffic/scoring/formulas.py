@@ -118,7 +118,7 @@ class FormulaVerdicts:
         if self._valuation is None:
             return ()
         signals = self._signals.result()
-        found = zip(self._texts.items(), self._monitors.verdicts[0].tolist(), self._since.tolist(), strict=True)
+        verdicts = zip(self._texts.items(), self._monitors.verdicts[0].tolist(), self._since.tolist(), strict=True)
         return tuple(
             FormulaVerdict(
                 name,
@@ -128,7 +128,7 @@ class FormulaVerdicts:
                 name not in self._monitors.late,
                 self._margin(name, signals, broken=verdict == FALSE),
             )
-            for (name, text), verdict, tick in found
+            for (name, text), verdict, tick in verdicts
         )
 
     def _margin(self, name: str, signals: Mapping[str, Floats], *, broken: bool) -> float | None:
@@ -142,8 +142,8 @@ class FormulaVerdicts:
 
 def _in_short(formulas: Sequence[FormulaVerdict]) -> str | None:
     """Return the verdicts on the user's formulas as JSON, None without formulas."""
-    found = {one.name: one.verdict for one in formulas}
-    return json.dumps(found) if found else None
+    by_name = {one.name: one.verdict for one in formulas}
+    return json.dumps(by_name) if by_name else None
 
 
 COLUMNS = (ScoreColumn(Column("formulas", kind="string"), lambda score: _in_short(score.formulas)),)

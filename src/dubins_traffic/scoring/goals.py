@@ -44,13 +44,13 @@ def visits_of(instance: Instance, rows: Sequence[GoalCounts], rounds: int, last:
     """Return the visits up to frame `last` from the counts of the goals; gaps run to the planned end at least."""
     rate, end = instance.problem.rate, max(planned_ticks(instance), last)
     goals = dict.fromkeys(instance.problem.goals)
-    found = [
+    visits = [
         GoalVisits(goal, row.visits, max(row.gap, end - row.last_visit) / rate)
         for goal, row in zip(goals, rows, strict=True)
     ]
     visited = sum([row.visits > 0 for row in rows]) / len(rows) if rows else 1.0
     fewest = min([row.visits - row.at_start for row in rows], default=RECURRENT)
-    return Visits(tuple(found), visited, rounds, fewest >= RECURRENT)
+    return Visits(tuple(visits), visited, rounds, fewest >= RECURRENT)
 
 
 COLUMNS = (

@@ -157,5 +157,5 @@ class Judging:
 
     def result(self) -> Verdict | None:
         """Return the verdict up to the last frame, None if the problem carries no rules."""
-        found = self.findings()
-        return found.verdict(found.visits, collisions_of(self._instance.names, self._contacts)[0])
+        findings = self.findings()
+        return findings.verdict(findings.visits, collisions_of(self._instance.names, self._contacts)[0])

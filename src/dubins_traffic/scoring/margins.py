@@ -100,13 +100,13 @@ class MarginTables(Tables):
 
 def margin_rules(rules: Sequence[RuleParameters], periods: Sequence[float], index: Ints) -> Rows[MarginRules]:
     """Return the parameters of the margins of trials; trial b has the rules and the period (s) of number index[b]."""
-    found: Any = table(MarginRules, len(index))
+    rows: Any = table(MarginRules, len(index))
     numbers: list[int] = index.tolist()
-    found["left_set"] = [rules[k].left_set for k in numbers]
-    found["left_release"] = [rules[k].left_release for k in numbers]
-    found["turn_back"] = [rules[k].turn_back for k in numbers]
-    found["window"] = [ticks(rules[k].left_time, periods[k]) for k in numbers]
-    return found
+    rows["left_set"] = [rules[k].left_set for k in numbers]
+    rows["left_release"] = [rules[k].left_release for k in numbers]
+    rows["turn_back"] = [rules[k].turn_back for k in numbers]
+    rows["window"] = [ticks(rules[k].left_time, periods[k]) for k in numbers]
+    return rows
 
 
 @jit
@@ -242,7 +242,7 @@ def entries_by_rule(margins: EntryMargins, period: float) -> dict[str, float | N
 
     Parameters
     ----------
-    found
+    margins
         The margins that the referee has found.
     period
         Seconds of a tick.
@@ -284,7 +284,7 @@ def _row(score: Judged) -> list[float]:
     return [*row, min(spare, -SURE) if missed else max(spare, SURE)]
 
 
-def margins_by_rule(gap: float | None, found: Sequence[float]) -> dict[str, float | None]:
+def margins_by_rule(gap: float | None, margins: Sequence[float]) -> dict[str, float | None]:
     """Return the margins by the rules' names, from the smallest gap (m) and the margins of `find_margins`, in order."""
-    named = zip(MEASURED, found, strict=True)
+    named = zip(MEASURED, margins, strict=True)
     return {"1.collision": gap} | {rule: value if math.isfinite(value) else None for rule, value in named}

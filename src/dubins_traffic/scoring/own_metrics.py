@@ -72,16 +72,16 @@ def _guarded(metric: Metric, method: str, *arguments: object) -> Any:
 
 
 def _values(metric: Metric) -> list[Measured]:
-    found = _guarded(metric, "result")
+    measured = _guarded(metric, "result")
     names = [column.name for column in metric.columns]
-    if not isinstance(found, Mapping) or set(cast("Mapping[str, Any]", found)) != set(names):
+    if not isinstance(measured, Mapping) or set(cast("Mapping[str, Any]", measured)) != set(names):
         raise _fault(
             metric,
             "returns other values than its columns",
-            cast("object", found),
+            cast("object", measured),
             f"a mapping of {', '.join(names)}",
         )
-    return [Measured(column, _value(metric, column, found[column.name])) for column in metric.columns]
+    return [Measured(column, _value(metric, column, measured[column.name])) for column in metric.columns]
 
 
 def _value(metric: Metric, column: Column, value: Any) -> Value:

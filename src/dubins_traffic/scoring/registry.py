@@ -63,20 +63,20 @@ def columns(specs: Sequence[MetricSpec], taken: Sequence[str] = ()) -> tuple[Col
     InputError
         As `load`; and if two columns have one name.
     """
-    found: dict[str, Column] = {}
+    by_name: dict[str, Column] = {}
     for spec in specs:
         for column in _columns_of(_maker(spec), spec):
-            if column.name in found or column.name in taken:
+            if column.name in by_name or column.name in taken:
                 raise _refuse(spec, f"has a column whose name is taken: {column.name}", "a name of its own")
-            found[column.name] = column
-    return tuple(found.values())
+            by_name[column.name] = column
+    return tuple(by_name.values())
 
 
 def makers(specs: Sequence[MetricSpec]) -> tuple[Maker, ...]:
     """Return the callables that make some metrics; the exceptions are those of `columns`."""
-    found = tuple(_maker(spec) for spec in specs)
-    columns(found)
-    return found
+    made = tuple(_maker(spec) for spec in specs)
+    columns(made)
+    return made
 
 
 def with_share(specs: Iterable[Spec], controllers: Iterable[object]) -> tuple[Spec | str, ...]:
@@ -98,13 +98,13 @@ def _columns_of(maker: Maker, spec: MetricSpec) -> tuple[Column, ...]:
     sound = isinstance(columns, list | tuple) and columns and all(isinstance(column, Column) for column in columns)  # pyright: ignore[reportUnknownVariableType]
     if not sound:
         raise _refuse(spec, "has no columns", "columns, a tuple of dubins_traffic.Column")
-    found = tuple(cast("Sequence[Column]", columns))
-    for described in found:
+    checked = tuple(cast("Sequence[Column]", columns))
+    for described in checked:
         if not _NAME.fullmatch(described.name) or described.kind not in get_args(Kind) or described.kind not in KINDS:
             raise _refuse(
                 spec, f"has a column that is none: {described.name} of kind {described.kind}", "a name and a kind"
             )
-    return found
+    return checked
 
 
 def _called(spec: MetricSpec) -> str:

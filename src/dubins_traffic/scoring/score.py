@@ -240,8 +240,8 @@ class Scorer:
         """
         self._show()
         begin = None if wall is None else wall.time_to_begin_s
-        found = self._tracked.findings() or self._judging.findings()
-        score = score_of(found, controller, begin)
+        findings = self._tracked.findings() or self._judging.findings()
+        score = score_of(findings, controller, begin)
         verdict = self._tracked.told(score.verdict)
         if verdict is not None and verdict.verdict is Ruling.UNTOLD:
             score = replace(score, counted_rounds=0, rounds_before_breach=0.0)
@@ -305,14 +305,14 @@ class ScoreSheet(Pictured, Tabulated):
     @property
     def icra2016_sum(self) -> float | None:
         """The final score of ICRA 2016: the sum over trials, correctly rounded; None if a trial has no such score."""
-        found = [score.icra2016 for score in self.trials if score.icra2016 is not None]
-        return math.fsum(found) if len(found) == len(self.trials) else None
+        scores = [score.icra2016 for score in self.trials if score.icra2016 is not None]
+        return math.fsum(scores) if len(scores) == len(self.trials) else None
 
     @property
     def assumption_broken(self) -> tuple[int, int]:
         """Number of judged trials in which the e-agents broke the assumption, and of all judged trials."""
-        found = [score.verdict.assumption_broken for score in self.trials if score.verdict is not None]
-        return sum(found), len(found)
+        broken = [score.verdict.assumption_broken for score in self.trials if score.verdict is not None]
+        return sum(broken), len(broken)
 
     def to_json(self) -> dict[str, Any]:
         """Return what ``run --json`` and ``score --json`` print."""

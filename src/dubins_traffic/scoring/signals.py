@@ -72,11 +72,11 @@ class Signals:
         self._x, self._y = (np.concatenate([getattr(block, name) for block in blocks]) for name in "xy")
         self._lane: Ints = np.concatenate([block.lane for block in blocks])
         held = np.concatenate(self._held)
-        found: dict[str, Floats] = {}
+        by_name: dict[str, Floats] = {}
         for column, (name, wanted) in enumerate(self._wanted.items()):
-            found[name] = self._signal(wanted, held[:, column])
+            by_name[name] = self._signal(wanted, held[:, column])
         del self._x, self._y, self._lane
-        return found
+        return by_name
 
     def _signal(self, wanted: Proposition, held: Mask) -> Floats:
         measure = self._measures.get(wanted.word)
@@ -131,12 +131,12 @@ class Signals:
         """Return how far the body reaches over the line at which `left` rises; -inf without a lane state."""
         lanes = self._lane[:, wanted.car]
         points = np.stack([self._x[:, wanted.car], self._y[:, wanted.car]], axis=-1)
-        found = np.full(len(points), -np.inf)
+        left = np.full(len(points), -np.inf)
         for lane in np.unique(lanes[lanes >= 0]).tolist():
             is_there = lanes == lane
             _, across = self._problem.network.lane_coordinates(lane, points[is_there])
-            found[is_there] = across + self._half - self._rules.left_set
-        return found
+            left[is_there] = across + self._half - self._rules.left_set
+        return left
 
     def _on_road(self, wanted: Proposition) -> Floats:
         points = np.stack([self._x[:, wanted.car], self._y[:, wanted.car]], axis=-1)

@@ -122,10 +122,10 @@ def tally_margins(
     trials: Ints, frames: Ints, tally: Tally, rules: Rows[MarginRules], roads: RoadTable, cars: CarTable
 ) -> Rows[EgoMargins]:
     """Return the margins of some trials of a tally, (B,), of which each has so many frames; others' are infinite."""
-    found = table(EgoMargins, len(tally.trial))
+    margins = table(EgoMargins, len(tally.trial))
     tables = MarginTables(rules, roads, cars, np.zeros(tally.ego.shape[1]))
-    find_margins(trials, frames, tally.ego, np.ascontiguousarray(tally.trial["net"]), tables, found)
-    return found
+    find_margins(trials, frames, tally.ego, np.ascontiguousarray(tally.trial["net"]), tables, margins)
+    return margins
 
 
 @jit

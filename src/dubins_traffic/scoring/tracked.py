@@ -63,8 +63,8 @@ class Tracked:
         if exact is None or not self._three:
             return exact
         verdict = replace(exact, tolerance=self._tolerance)
-        found = [tracked.result() for tracked in self._three[1:]]
-        if all(verdict_there is not None and verdict_there.verdict is verdict.verdict for verdict_there in found):
+        results = [tracked.result() for tracked in self._three[1:]]
+        if all(verdict_there is not None and verdict_there.verdict is verdict.verdict for verdict_there in results):
             return verdict
         return replace(verdict, verdict=Ruling.UNTOLD, clean=False, cut=True, excuse=None)
 

@@ -302,23 +302,23 @@ def _formulas(
 
     Norm: docs/rules.md#liveness.
     """
-    found: dict[str, Status] = dict.fromkeys(EGO_RULES, HELD)
+    status: dict[str, Status] = dict.fromkeys(EGO_RULES, HELD)
     for rule in running.ego.intersection(EGO_RULES):
-        found[rule] = PENDING
+        status[rule] = PENDING
     for rule in {breach.rule for breach in breaches if breach.car == EGO}.intersection(EGO_RULES):
-        found[rule] = BROKEN
+        status[rule] = BROKEN
     for goal, there in zip(visits.goals, visited_now, strict=True):
         x, y = goal.goal
-        found[f"1.goal {x} {y}"] = HELD if there else PENDING
+        status[f"1.goal {x} {y}"] = HELD if there else PENDING
     pending = {assumption_of(rule) for rule in running.others}
     others = [breach for breach in breaches if breach.car != EGO]
     for assumption in assumed(rules):
-        found[assumption] = PENDING if assumption in pending else HELD
-    for assumption in {assumption_of(breach.rule) for breach in others}.intersection(found):
+        status[assumption] = PENDING if assumption in pending else HELD
+    for assumption in {assumption_of(breach.rule) for breach in others}.intersection(status):
         of_it = [breach for breach in others if assumption_of(breach.rule) == assumption]
         if first_fall(of_it, rules, rate) is not None:
-            found[assumption] = BROKEN
-    return found
+            status[assumption] = BROKEN
+    return status
 
 
 def assumption_of(rule: str) -> str:

@@ -45,14 +45,14 @@ def rivals(
     """Return what somebody may compare a submission with: numbers and names of others whose trials they may see."""
     row, at = submission.phase, service.clock()
     submissions = receiving.submissions_of(session, row, submission.team_id)
-    found = {one.id: f"{one.id}, {one.filename}" for one in submissions if one.state not in ("rejected", "cancelled")}
+    labels = {one.id: f"{one.id}, {one.filename}" for one in submissions if one.state not in ("rejected", "cancelled")}
     _, places = viewing.latest_places(service, session, row, account)
     for place in places:
         other = session.get_one(Submission, place["submission"])
         if viewing.sees_trials(row, account, other, at):
-            found.setdefault(other.id, f"{other.id} of {place['entry']}")
-    found.pop(submission.id, None)
-    return list(found.items())
+            labels.setdefault(other.id, f"{other.id} of {place['entry']}")
+    labels.pop(submission.id, None)
+    return list(labels.items())
 
 
 def beside(service: Service, session: Session, number: int, other: int, account: Account | None) -> dict[str, Any]:
@@ -101,11 +101,11 @@ def steps(service: Service, row: Phase, documents: list[dict[str, Any]]) -> list
 def team_places(service: Service, session: Session, account: Account, team_id: int) -> list[dict[str, Any]]:
     """Return the phases to which a team has handed in: its place as far as it is shown, and its progress."""
     entered = select(Submission.phase_id).where(Submission.team_id == team_id)
-    found: list[dict[str, Any]] = []
+    listed: list[dict[str, Any]] = []
     for row in session.scalars(select(Phase).where(Phase.id.in_(entered)).order_by(Phase.id.desc())):
         _, places = viewing.latest_places(service, session, row, account)
         place = next((one["place"] for one in places if one["team"] == team_id), None)
-        found.append(
+        listed.append(
             {
                 "slug": row.competition.slug,
                 "competition": row.competition.title,
@@ -116,7 +116,7 @@ def team_places(service: Service, session: Session, account: Account, team_id: i
                 "metric": service.phase(row).ranking.metric,
             }
         )
-    return found
+    return listed
 
 
 def replays(
@@ -124,15 +124,15 @@ def replays(
 ) -> list[dict[str, Any]]:
     """Return the best trial of the first place and the worst of the last, where somebody may see their trials."""
     ranked = [place for place in places if place["place"] is not None]
-    found: list[dict[str, Any]] = []
+    links: list[dict[str, Any]] = []
     for word, place in zip(("best", "worst"), (*ranked[:1], *ranked[-1:]), strict=False):
         submission = session.get_one(Submission, place["submission"])
         if viewing.sees_trials(row, account, submission, service.clock()):
             trial = viewing.extremes(service, session, submission).get(word)
             if trial is not None:
                 metric = service.phase(row).ranking.metric
-                found.append({"word": word, "entry": place["entry"], **_shown(submission, trial, metric)})
-    return found
+                links.append({"word": word, "entry": place["entry"], **_shown(submission, trial, metric)})
+    return links
 
 
 def wait_of(session: Session, place: int | None, at: float) -> float | None:

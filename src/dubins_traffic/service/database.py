@@ -136,10 +136,10 @@ def _check_known(connection: Connection, known: ScriptDirectory) -> None:
 
 
 def _check_columns(connection: Connection) -> None:
-    found = inspect(connection)
+    inspector = inspect(connection)
     for table in Base.metadata.sorted_tables:
         missing = {column.name for column in table.columns} - {
-            column["name"] for column in found.get_columns(table.name)
+            column["name"] for column in inspector.get_columns(table.name)
         }
         if missing:
             raise InputError(

@@ -75,8 +75,8 @@ def changes(service: Service, row: Competition, other: Loaded) -> list[Change]:
     """Return in what a competition file differs from the competition as it is now."""
     now = Loaded.from_document(present(service, row), row.slug, service.place(row.slug))
     before, after = _flat(now), _flat(other)
-    found = [Change(name, before.get(name), after.get(name)) for name in dict.fromkeys((*before, *after))]
-    return [change for change in found if not change.same]
+    changed = [Change(name, before.get(name), after.get(name)) for name in dict.fromkeys((*before, *after))]
+    return [change for change in changed if not change.same]
 
 
 def edit(
@@ -96,17 +96,17 @@ def edit(
     if row is None:
         raise WrongEntryError("no such competition")
     loaded = Loaded.from_document(document, FILE, service.place(slug))
-    found = changes(service, row, loaded)
+    changed = changes(service, row, loaded)
     phases = {phase.name: phase for phase in row.phases}
-    for change in found:
+    for change in changed:
         if change.locked:
             raise RefusedError(f"{change}: locked since the start; dates, quotas, texts and pages may change")
-    for change in found:
+    for change in changed:
         if change.date:
             _move(change, phases[change.date[0]], loaded, at)
         note(session, by, "edit", slug, str(change), at)
     row.title, row.document = loaded.title, json.dumps(loaded.document, sort_keys=True)
-    return found
+    return changed
 
 
 def edit_by_files(service: Service, slug: str, given: Mapping[str, bytes], by: Account | None) -> list[Change]:
@@ -115,9 +115,9 @@ def edit_by_files(service: Service, slug: str, given: Mapping[str, bytes], by: A
     with tempfile.TemporaryDirectory(dir=service.place(slug).parent) as draft:
         loaded = organising.written(Path(draft), given)
         with service.database.writing() as session:
-            found = edit(service, session, slug, loaded.document, by)
+            changed = edit(service, session, slug, loaded.document, by)
     replace_file(service.place(slug) / FILE, lambda neighbour: neighbour.write_bytes(given[FILE]))
-    return found
+    return changed
 
 
 def edited_by_form(document: dict[str, Any], form: Mapping[str, str]) -> dict[str, Any]:

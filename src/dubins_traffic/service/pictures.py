@@ -83,8 +83,8 @@ def _moves(way: Floats) -> str:
     return ";".join(",".join(_at(point)) for point in way)
 
 
-def _obstacles(found: list[dict[str, Any]]) -> Iterator[str]:
-    for one in found:
+def _obstacles(obstacles: list[dict[str, Any]]) -> Iterator[str]:
+    for one in obstacles:
         if "disc" in one:
             x, y, radius = one["disc"]
             turn = np.linspace(0.0, 2.0 * np.pi, 16, endpoint=False)

@@ -81,8 +81,8 @@ def _say_changes(service: Service, slug: str, path: Path) -> None:
         return
     with service.database.reading() as session:
         row = competition_of(session, slug)
-        found = [] if row is None else editing.changes(service, row, loaded)
-    for change in found:
+        changed = [] if row is None else editing.changes(service, row, loaded)
+    for change in changed:
         advice = "locked" if change.locked else f"to change it: /desk/edit/{slug}"
         log.warning("the file differs from the competition", competition=slug, difference=str(change), advice=advice)
 

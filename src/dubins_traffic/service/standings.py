@@ -133,8 +133,8 @@ def latest_standing(session: Session, phase: Phase, hiding: Hiding) -> Standing 
 def history(session: Session, phase: Phase, hiding: Hiding, page: int) -> tuple[list[Standing], bool]:
     """Return a page of the tables of a phase before the latest, newest first, and whether older ones follow."""
     query = select(Standing).where(Standing.phase_id == phase.id).order_by(Standing.id.desc())
-    found = session.scalars(query.offset(1 + page * PAGE).limit(PAGE + 1)).all()
-    return [hiding.shown(one) for one in found[:PAGE]], len(found) > PAGE
+    rows = session.scalars(query.offset(1 + page * PAGE).limit(PAGE + 1)).all()
+    return [hiding.shown(one) for one in rows[:PAGE]], len(rows) > PAGE
 
 
 def first_entries(session: Session, phase: Phase, count: int, hiding: Hiding) -> list[int]:

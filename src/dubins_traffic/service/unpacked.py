@@ -62,10 +62,10 @@ class Unpacked:
         """
         for path in self._folder.glob(f"{AWAY}*"):
             shutil.rmtree(path, ignore_errors=True)  # another worker may be removing it
-        found = sorted((used, path) for path in self._paths() if (used := _used(path)) is not None)
-        sizes = {path: _size(path) for _, path in found}
+        oldest = sorted((used, path) for path in self._paths() if (used := _used(path)) is not None)
+        sizes = {path: _size(path) for _, path in oldest}
         total, now = sum(sizes.values()), time.time()
-        for used, path in found:
+        for used, path in oldest:
             if (now - used > self._age or total > self._most) and _remove(path):
                 total -= sizes[path]
 

@@ -88,8 +88,8 @@ class Outside:
         def described(instance: Instance) -> Instance:
             problem, is_first = instance.problem, not known
             if is_first:
-                found = world.measure(instance, turn=self.delay is None)
-                known.append(found if self.delay is None else replace(found, delay=self.delay))
+                measured = world.measure(instance, turn=self.delay is None)
+                known.append(measured if self.delay is None else replace(measured, delay=self.delay))
             declared = known[0].disturbances(problem, self.noise, LOSS if self.loss is None else self.loss)
             if is_first:
                 plan.say(known[0].told(problem, declared))

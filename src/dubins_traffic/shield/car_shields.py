@@ -90,9 +90,9 @@ class CarShields:
         self._shield(self._tick, False, self._traffic, self._shields, self._commands)
         running = rows[self._tick[rows] >= 0]
         flat[running] = self._commands[running, EGO]
-        found: Any = np.full(len(flat), REASON.NOTHING, dtype=np.int64)
-        found[running] = self._shields.ego["reason"][running]
-        return found.reshape(commands.shape[:2])
+        reasons: Any = np.full(len(flat), REASON.NOTHING, dtype=np.int64)
+        reasons[running] = self._shields.ego["reason"][running]
+        return reasons.reshape(commands.shape[:2])
 
     @staticmethod
     def name(reason: int) -> str:

@@ -105,14 +105,14 @@ def refusal(b: int, speed: float, yaw_rate: float, near: int, traffic: Traffic, 
         if off2 >= before2:
             return REASON.ROAD
     v, away2 = nearest_vertex(roads, net, nx, ny)
-    found = _enters(b, v, after, traffic)
-    if found != REASON.NOTHING:
-        return found
+    reason = _enters(b, v, after, traffic)
+    if reason != REASON.NOTHING:
+        return reason
     rim = vehicle.disc - vehicle.unsure
     at = v if away2 < rim * rim else -1
-    found = _leaves_lane(b, at, segment, off2, after, traffic, shields)
-    if found != REASON.NOTHING:
-        return found
+    reason = _leaves_lane(b, at, segment, off2, after, traffic, shields)
+    if reason != REASON.NOTHING:
+        return reason
     return REASON.CONTACT if may_touch(b, speed, yaw_rate, near, traffic, vehicle) else REASON.NOTHING
 
 

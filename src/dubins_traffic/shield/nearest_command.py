@@ -152,9 +152,9 @@ def _may_obey(
         return False
     if np.int64(traffic.labels.bits[b, EGO]) & FLAG.LEFT != 0:
         return True
-    found = refusal(b, law.speed, law.yaw_rate, near, traffic, shields)
-    if found != REASON.LANE:
-        return found == REASON.NOTHING
+    reason = refusal(b, law.speed, law.yaw_rate, near, traffic, shields)
+    if reason != REASON.LANE:
+        return reason == REASON.NOTHING
     mode = shields.ego[b].mode
     if drivers.car[b, EGO].aside == 0.0 or mode == MODE.NEVER:
         return False

@@ -74,9 +74,9 @@ class Embedded:
         """Clip `commands` (B, N, 2) in place, move for one tick and return the contacts of each trial."""
         if not (commands.dtype == np.float64 and commands.flags.carray):
             copied = np.array(commands, dtype=np.float64, order="C")
-            found = self.step(copied)
+            met = self.step(copied)
             commands[...] = copied
-            return found
+            return met
         trials = len(self._none)
         contacts: list[tuple[Contact, ...]] = self._none
         self._tick += 1

@@ -103,8 +103,8 @@ class ModelledCars:
         most = MOST_ARCS + 1
         arcs: Any = self._answer(n, "advance", lambda: tuple(islice(model.advance(speed, yaw_rate), most)))
         if not 1 <= len(arcs) < most:
-            found = "0 arcs" if not arcs else f"more than {MOST_ARCS} arcs"
-            raise self._lost(n, "advance", found, f"1 to {MOST_ARCS} arcs")
+            arcs_named = "0 arcs" if not arcs else f"more than {MOST_ARCS} arcs"
+            raise self._lost(n, "advance", arcs_named, f"1 to {MOST_ARCS} arcs")
         rows = [self._numbers(n, "advance", arc, 3) for arc in arcs]
         ends = np.cumsum([seconds for _, _, seconds in rows])
         if min(seconds for _, _, seconds in rows) < 0.0 or abs(ends[-1] / self._period - 1.0) > ROUNDING:

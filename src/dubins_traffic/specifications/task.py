@@ -110,7 +110,7 @@ def _rules_2_and_3(name: str, crossings: Iterable[Point], rules: RuleParameters)
     """Return rules 2 and 3 for a car."""
     left = prop(f"left_{name}")
     back = disj(negation(left), prop(f"hemmed_{name}"))
-    found = [
+    formulas = [
         always(implies(left, prop(f"overtaking_{name}"))),
         always(implies(left, eventually(back, (0.0, rules.left_time)))),
         always(negation(prop(f"turned_{name}"))),
@@ -119,8 +119,8 @@ def _rules_2_and_3(name: str, crossings: Iterable[Point], rules: RuleParameters)
         enter, stopped, ahead, clear = (
             prop(_on(f"{word}_{name}", point)) for word in ("enter", "stopped", "ahead", "clear")
         )
-        found += [always(implies(enter, yesterday(condition))) for condition in (stopped, negation(ahead), clear)]
-    return found
+        formulas += [always(implies(enter, yesterday(condition))) for condition in (stopped, negation(ahead), clear)]
+    return formulas
 
 
 def _assumed(name: str, crossings: Sequence[Point], rules: RuleParameters) -> list[Formula]:

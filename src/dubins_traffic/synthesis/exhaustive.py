@@ -349,28 +349,28 @@ class _Lost:
 
     def ending(self) -> Flags:
         """Return which nodes have a play that ends there."""
-        found = np.zeros(self._count, dtype=np.bool_)
-        found[self._ends] = True
-        return found
+        ends = np.zeros(self._count, dtype=np.bool_)
+        ends[self._ends] = True
+        return ends
 
     def before(self, nodes: Flags, within: Flags | None = None) -> Flags:
         """Return the nodes that are among `nodes` or lead there, all the way `within` some."""
-        found = nodes.copy()
+        reaching = nodes.copy()
         while True:
-            more = found.copy()
-            more[self._from[found[self._to]]] = True
+            more = reaching.copy()
+            more[self._from[reaching[self._to]]] = True
             if within is not None:
                 more &= within | nodes
-            if (more == found).all():
-                return found
-            found = more
+            if (more == reaching).all():
+                return reaching
+            reaching = more
 
     def leads(self, nodes: Flags, within: Flags) -> Flags:
         """Return the nodes of `within` from which one move or more, within it, lead to `nodes`."""
         reached = self.before(nodes & within, within)
-        found = np.zeros(self._count, dtype=np.bool_)
-        found[self._from[reached[self._to]]] = True
-        return found & within
+        leading = np.zeros(self._count, dtype=np.bool_)
+        leading[self._from[reached[self._to]]] = True
+        return leading & within
 
     def kept_from(self, goal: int) -> Flags:
         """Return where plays go on from which never are at a goal and owe no debt for ever."""
@@ -395,13 +395,13 @@ def _ended(graph: _Graph) -> CounterPlay | None:
 
 def _way_to(graph: _Graph, node: int) -> list[tuple[int, ...]]:
     """Return the turns from a start to a node."""
-    found: list[tuple[int, ...]] = []
+    way: list[tuple[int, ...]] = []
     while node >= 0:
-        found.append(graph.places[node].cells)
+        way.append(graph.places[node].cells)
         node, between = graph.parents[node]
         if between is not None:
-            found.append(between.cells)
-    return found[::-1]
+            way.append(between.cells)
+    return way[::-1]
 
 
 def _kept(graph: _Graph, lost: _Lost, fair: Flags, goal: int) -> CounterPlay:
@@ -440,7 +440,7 @@ def _shortest(graph: _Graph, moves: dict[int, list[int]], node: int, wanted: Fla
 
 
 def _back(graph: _Graph, came: dict[int, int], node: int, there: int) -> list[int]:
-    found = [came[there]]
-    while graph.sources[found[-1]] != node:
-        found.append(came[graph.sources[found[-1]]])
-    return found[::-1]
+    path = [came[there]]
+    while graph.sources[path[-1]] != node:
+        path.append(came[graph.sources[path[-1]]])
+    return path[::-1]

@@ -86,10 +86,10 @@ class Strategy:
         board = self.board
         out = room(board, 1, LARGEST_CHOICE)
         list_moves(board.tables, position, Work.of(board), out)
-        found = self.best(out.ego_to[: out.used[0].ego_to], goal)
-        if found is None:
+        best = self.best(out.ego_to[: out.used[0].ego_to], goal)
+        if best is None:
             raise InputError("the strategy does not win from there", field="position", value=position)
-        return found
+        return best
 
     def best(self, options: Numbers, goal: int) -> int | None:
         """Return which of some positions has the lowest rank for a goal, the first of several; None if none has one."""

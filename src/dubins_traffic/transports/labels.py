@@ -26,15 +26,15 @@ def words(network: RoadNetwork, names: Sequence[str], segment: Ints, at: Ints) -
     tuple of str
         One segment label per car, by car, each followed by the intersection label if there is one.
     """
-    found: list[str] = []
+    labels: list[str] = []
     for n, name in enumerate(names):
         x0, y0, x1, y1 = network.segments[int(segment[n])]
-        found.append(f"{name}_s_{x0}_{y0}_{x1}_{y1}")
+        labels.append(f"{name}_s_{x0}_{y0}_{x1}_{y1}")
         v = int(at[n])
         if v >= 0:
             x, y = network.intersections[v]
-            found.append(f"{name}_t_{x}_{y}")
-    return tuple(found)
+            labels.append(f"{name}_t_{x}_{y}")
+    return tuple(labels)
 
 
 class Caption:

@@ -128,7 +128,7 @@ def delay_of(samples: Sequence[Sample], told: Turned) -> float | None:
     times: Floats = np.array([sample.time for sample in samples])
     turned: Floats = np.unwrap([sample.heading for sample in samples])
     turned -= turned.mean()
-    best, found, gain = math.inf, 0.0, 0.0
+    best, late, gain = math.inf, 0.0, 0.0
     for delay in np.arange(0.0, LATEST, STEP).tolist():
         way = told.way(times - delay)
         way -= way.mean()
@@ -136,8 +136,8 @@ def delay_of(samples: Sequence[Sample], told: Turned) -> float | None:
         share = float(way @ turned) / size if size > 0.0 else 0.0
         left = float(((turned - share * way) ** 2).sum())
         if left < best:
-            best, found, gain = left, delay, share
-    return found if gain > 0.5 else None
+            best, late, gain = left, delay, share
+    return late if gain > 0.5 else None
 
 
 class LagWatch:

@@ -176,7 +176,7 @@ def checked_reports(reports: Iterable[object]) -> list[tuple[str, str]]:
     TypeError
         If a report is anything but a pair of texts.
     """
-    found: list[tuple[str, str]] = []
+    checked: list[tuple[str, str]] = []
     for entry in reports:
         pair = tuple(cast("Sequence[object]", entry)) if isinstance(entry, tuple | list) else ()
         if len(pair) != 2 or not all(isinstance(part, str) for part in pair):
@@ -184,8 +184,8 @@ def checked_reports(reports: Iterable[object]) -> list[tuple[str, str]]:
                 f"report() must return pairs of texts (kind, detail): got {blame.value_text(cast(object, entry), 80)}"
             )
         kind, detail = map(str, pair)
-        found.append((shown(kind), shown(detail)))
-    return found
+        checked.append((shown(kind), shown(detail)))
+    return checked
 
 
 def _deadline_error(deadline: float, tick: int) -> ControllerError:

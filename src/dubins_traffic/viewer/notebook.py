@@ -94,9 +94,9 @@ def trial_html(instance: Instance, score: Score, paths: Sequence[Floats] = (), e
 
 def sheet_html(heading: str, sheet: ScoreSheet) -> str:
     """Return the HTML of scores: the shares of their verdicts, or ends, and the first trials as a table."""
-    found: dict[str, Counter[str]] = {}
+    by_controller: dict[str, Counter[str]] = {}
     for trial in sheet.trials:
-        found.setdefault(trial.controller or "-", Counter())[trial.outcome] += 1
+        by_controller.setdefault(trial.controller or "-", Counter())[trial.outcome] += 1
     head = ("trial", "controller", "verdict", "end", "rounds", "goals visited", "collisions")
     rows = [
         (
@@ -110,7 +110,7 @@ def sheet_html(heading: str, sheet: ScoreSheet) -> str:
         )
         for trial in sheet.trials[:ROWS]
     ]
-    return shares_html(heading, sheet.summary, found, head, rows, len(sheet.trials))
+    return shares_html(heading, sheet.summary, by_controller, head, rows, len(sheet.trials))
 
 
 def shares_html(

@@ -169,14 +169,14 @@ def stop_lines(problem: Problem) -> list[tuple[Floats, Floats]]:
         return []
     network = problem.network
     least = RuleParameters.from_mapping(problem.rules).crossing_degree
-    found: list[tuple[Floats, Floats]] = []
+    lines: list[tuple[Floats, Floats]] = []
     for ends, tangent, last in zip(network.ends, network.tangents, network.end_tangents, strict=True):
         for vertex, away in ((int(ends[0]), tangent), (int(ends[1]), -last)):
             if network.degrees[vertex] >= least:
                 middle = network.points[vertex] + problem.intersection_radius * away
                 right = np.array([-away[1], away[0]])
-                found.append((middle, middle + 0.5 * problem.car.road_width * right))
-    return found
+                lines.append((middle, middle + 0.5 * problem.car.road_width * right))
+    return lines
 
 
 def places(network: RoadNetwork, car: Car) -> list[Shape]:

@@ -177,8 +177,8 @@ def _instances(run: _Run, rows: Ints) -> dict[tuple[str, int, int], int]:
 def _change(metric: Column, first: Floats, second: Floats, *, paired: bool) -> Change | None:
     one, other = estimate(first, median=False), estimate(second, median=False)
     if paired:
-        found = estimate(second - first, median=False)
-        mean, interval = found.mean, found.mean_interval
+        change = estimate(second - first, median=False)
+        mean, interval = change.mean, change.mean_interval
     else:
         mean, interval = apart(first, second)
     if mean is None or interval is None:

@@ -204,11 +204,11 @@ def ranked(campaign: Campaign, results: Any) -> list[str]:
 
 def _factors(campaign: Campaign) -> dict[str, list[str]]:
     """Return what varied, with its values as texts, in their order; the configuration is one of them."""
-    found = {CONFIGURATION: list(dict.fromkeys(cell.configuration for cell in campaign.cells))}
+    factors = {CONFIGURATION: list(dict.fromkeys(cell.configuration for cell in campaign.cells))}
     for name in campaign.factors:
-        found[name] = list(dict.fromkeys(table.factor_text(cell.values[name]) for cell in campaign.cells))
-    varied = {name: values for name, values in found.items() if len(values) > 1}
-    return varied or {CONFIGURATION: found[CONFIGURATION]}
+        factors[name] = list(dict.fromkeys(table.factor_text(cell.values[name]) for cell in campaign.cells))
+    varied = {name: values for name, values in factors.items() if len(values) > 1}
+    return varied or {CONFIGURATION: factors[CONFIGURATION]}
 
 
 def _standing(
@@ -293,8 +293,8 @@ def _levels(
             here = texts == level
             for controller, of_controller in chosen.items():
                 for metric in metrics:
-                    found = estimate(values[metric.name][here & of_controller], median=False)
-                    yield Level(factor, level, controller, metric, found)
+                    mean = estimate(values[metric.name][here & of_controller], median=False)
+                    yield Level(factor, level, controller, metric, mean)
 
 
 def floats(column: Any) -> Floats:

@@ -39,7 +39,7 @@ def latex_table(comparison: Comparison) -> str:
 
 def escaped(text: str) -> str:
     """Return a text as LaTeX prints it, in one line."""
-    return re.sub(r".", lambda found: SPECIAL.get(found[0], found[0]), " ".join(text.split()))
+    return re.sub(r".", lambda match: SPECIAL.get(match[0], match[0]), " ".join(text.split()))
 
 
 def _name(standing: Standing) -> str:

@@ -159,9 +159,9 @@ def _drawn(count: int) -> Ints:
     return np.random.default_rng(SEED).integers(0, count, (RESAMPLES, count))
 
 
-def _between(found: Floats) -> Interval:
+def _between(resampled: Floats) -> Interval:
     """Return the interval between the percentiles of what was found of each resample."""
-    ordered: list[float] = np.sort(found).tolist()
+    ordered: list[float] = np.sort(resampled).tolist()
     tail = (1.0 - LEVEL) / 2.0
     return _quantile(ordered, tail), _quantile(ordered, 1.0 - tail)
 

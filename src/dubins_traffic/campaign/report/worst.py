@@ -69,8 +69,8 @@ def order(results: Any) -> Ints:
     compute: Any = rows.arrow().compute
 
     def among(values: Iterable[str]) -> Ints:
-        found = compute.is_in(results["end"], rows.arrow().array(sorted(values), rows.arrow().string()))
-        return found.cast("int64").to_numpy(zero_copy_only=False)
+        chosen = compute.is_in(results["end"], rows.arrow().array(sorted(values), rows.arrow().string()))
+        return chosen.cast("int64").to_numpy(zero_copy_only=False)
 
     def number(column: str) -> Floats:
         return compute.fill_null(results[column].cast("float64"), 0.0).to_numpy(zero_copy_only=False)
@@ -93,18 +93,18 @@ def why(row: Mapping[str, Any]) -> str:
     """Return in words why a trial is among the worst."""
     if row["reason"]:
         return f"{row['end'].replace('_', ' ')}: {row['reason']}"
-    found: list[str] = []
+    reasons: list[str] = []
     at_fault = (row["collisions_ego_fault"] or 0) + (row["collisions_both_fault"] or 0)
     if row["collisions"]:
-        found.append(f"{number_of(row['collisions'], 'collision')}, {at_fault} with the ego at fault")
+        reasons.append(f"{number_of(row['collisions'], 'collision')}, {at_fault} with the ego at fault")
     if row["breaches"]:
-        found.append(f"{number_of(row['breaches'], 'breach', 'breaches')}, {row['verdict']}")
-    if not found:
+        reasons.append(f"{number_of(row['breaches'], 'breach', 'breaches')}, {row['verdict']}")
+    if not reasons:
         whole = "" if row["end"] == End.DURATION else f", {words(row['end'])} after {row['duration_s']:.1f} s"
         kept, rounds = row["counted_rounds"], row["rounds"]
         some = number_of(rounds, "round") if kept == rounds else f"{kept} of {rounds} rounds count"
-        found.append(f"{row['goals_visited']:.0%} of the goals visited, {some}{whole}")
-    return "; ".join(found)
+        reasons.append(f"{row['goals_visited']:.0%} of the goals visited, {some}{whole}")
+    return "; ".join(reasons)
 
 
 def worst(
@@ -123,15 +123,15 @@ def worst(
     chosen = {name: _first(results.filter(compute.equal(results["controller"], name)), count) for name in controllers}
     total = sum(map(len, chosen.values()))
     (folder / FOLDER).mkdir(parents=True, exist_ok=True)
-    found: dict[str, list[Bad]] = {}
+    by_controller: dict[str, list[Bad]] = {}
     done = 0
     for name, found_rows in chosen.items():
-        found[name] = []
+        by_controller[name] = []
         for row in found_rows:
             tell(done, total)
-            found[name].append(_bad(campaign, row, folder))
+            by_controller[name].append(_bad(campaign, row, folder))
             done += 1
-    return found
+    return by_controller
 
 
 def _first(trials: Any, count: int) -> list[Mapping[str, Any]]:
@@ -170,8 +170,8 @@ def replay(campaign: Campaign, row: Mapping[str, Any], page: Path) -> rows.Row:
     with tempfile.TemporaryDirectory() as folder:
         record = Path(folder) / "trial.mcap"
         result = chunk.job(0, record).run()
-        found = reader.read(record)
-    verdict = score(found).verdict
+        there = reader.read(record)
+    verdict = score(there).verdict
     summary = {"controller": row["controller"], **{name: row[name] for name in SUMMARY}}
-    write_replay(page, found.instance, found.frames, found.ending, summary, verdict=verdict, overwrite=True)
+    write_replay(page, there.instance, there.frames, there.ending, summary, verdict=verdict, overwrite=True)
     return rows.row(chunk.number, result.ending, result.score, result.wall.act_s)

@@ -95,8 +95,8 @@ def _facts(comparison: Comparison) -> list[str]:
 
 def charts(comparison: Comparison) -> list[plots.Chart]:
     """Return all charts of the page, which are written for papers, too."""
-    found = [plots.ranking(comparison), *_overview(comparison), *_formula_charts(comparison)]
-    return [*found, *(chart for factor in comparison.factors for chart in _against(comparison, factor)[1])]
+    drawn = [plots.ranking(comparison), *_overview(comparison), *_formula_charts(comparison)]
+    return [*drawn, *(chart for factor in comparison.factors for chart in _against(comparison, factor)[1])]
 
 
 def _overview(comparison: Comparison) -> list[plots.Chart]:
@@ -131,14 +131,14 @@ def _page_shares(comparison: Comparison) -> list[tuple[str, list[str], list[str]
         "Trials in which others broke the assumption": [standing.fallen for standing in standings],
         "Ends of all trials": [standing.ends for standing in standings],
     }
-    found: list[tuple[str, list[str], list[str], list[Any], str]] = []
+    bars: list[tuple[str, list[str], list[str], list[Any], str]] = []
     for title, shares in groups.items():
         names = list(dict.fromkeys(name for group in shares for name in group))
         cited = next((explain(name) for name in names if name in (*EGO_RULES, *ASSUMPTIONS)), "")
         if names:
             heads = [words(name) for name in names]
-            found.append((title, names, heads, list(zip(standings, shares, strict=True)), cited))
-    return found
+            bars.append((title, names, heads, list(zip(standings, shares, strict=True)), cited))
+    return bars
 
 
 def _made(manifest: Mapping[str, Any]) -> dict[str, str]:
@@ -263,8 +263,8 @@ def replay_trial(
         require_output(output, "a page", PAGES, overwrite=overwrite)
     place, _, campaign, results = open_campaign(folder)
     compute: Any = rows.arrow().compute
-    found = results.filter(compute.equal(results["number"], number)).to_pylist()
-    if not found:
+    matching = results.filter(compute.equal(results["number"], number)).to_pylist()
+    if not matching:
         expected = f"the number of a trial that has been run; {len(results)} of {campaign.total} have"
         raise InputError("no such trial", file=str(place), field="number", value=number, expected=expected)
     if output is None:
@@ -272,8 +272,8 @@ def replay_trial(
         make_folder(target.parent, "a report")
     else:
         target = Path(output)
-    again = replay(campaign, found[0], target)
-    return target, "" if same(found[0], again) else OTHER_WAY
+    again = replay(campaign, matching[0], target)
+    return target, "" if same(matching[0], again) else OTHER_WAY
 
 
 def open_campaign(folder: str | os.PathLike[str]) -> tuple[Path, Mapping[str, Any], Campaign, Any]:
@@ -292,10 +292,10 @@ def open_campaign(folder: str | os.PathLike[str]) -> tuple[Path, Mapping[str, An
     if known is None:
         raise InputError("no campaign", file=str(place), expected="the folder of a campaign, with manifest.json")
     campaign = manifest.stored_campaign(place, known)
-    found = table.read(place, campaign, [path for _, _, path in folders.parts(place)])
-    if not len(found):
+    results = table.read(place, campaign, [path for _, _, path in folders.parts(place)])
+    if not len(results):
         raise InputError("nothing is finished yet", file=str(place), expected="a campaign that has begun")
-    return place, known, campaign, found
+    return place, known, campaign, results
 
 
 def _silent(_done: int, _total: int) -> None:

@@ -42,13 +42,13 @@ def cut(pieces: list[LanePiece], begin: float, end: float) -> list[LanePiece]:
 
     Before its begin and beyond its end the first and the last line go on.
     """
-    found: list[LanePiece] = []
+    cut_off: list[LanePiece] = []
     for k, whole in enumerate(pieces):
         low = begin if k == 0 else max(begin, whole.begin)
         high = end if k == len(pieces) - 1 else min(end, whole.end)
-        if high > low or (k == len(pieces) - 1 and not found):
-            found += _parts(whole, low, high)
-    return found
+        if high > low or (k == len(pieces) - 1 and not cut_off):
+            cut_off += _parts(whole, low, high)
+    return cut_off
 
 
 def _parts(whole: LanePiece, low: float, high: float) -> list[LanePiece]:

@@ -97,8 +97,8 @@ class PathMaker:
 
     def turn(self, lane: int, other: int) -> Turn:
         """Return the turn from one lane to a successor."""
-        found = self._turns.get((lane, other))
-        if found is None:
+        turn = self._turns.get((lane, other))
+        if turn is None:
             v = self._network.lane_ends(lane)[1]
             site = Site(
                 round(angle_between(*self._ends[lane], *self._begins[other]), 9),
@@ -109,8 +109,8 @@ class PathMaker:
                 self._problem.car,
                 v in self._visited,
             )
-            found = self._turns[lane, other] = shape(site)
-        return found
+            turn = self._turns[lane, other] = shape(site)
+        return turn
 
     def _straight(self, lane: int, end: int) -> float:
         """Return the length of a lane; of one that bends, twice that of its straight first or last line."""

@@ -105,16 +105,16 @@ def next_narrow(
             begin = min(begin, along - size)
     end = begin
     offset = -1.0
-    found = begin != INFINITE
-    while found:
-        found = False
+    narrow = begin != INFINITE
+    while narrow:
+        narrow = False
         for p in range(first, last):
             along, left = lane_coordinates(roads, net, lane, obstacles.parts[p].x, obstacles.parts[p].y)
             size = obstacles.parts[p].reach
             in_way = abs(left + vehicle.middle) < wide + size and begin <= along - size <= end + NARROWS
             if in_way and along + size > end:
                 end = along + size
-                found = True
+                narrow = True
             if in_way:
                 offset = max(offset, left + vehicle.middle + size)
     return begin, end, offset

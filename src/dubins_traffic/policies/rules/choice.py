@@ -144,14 +144,14 @@ def take_way_on(b: int, n: int, full: bool, traffic: Traffic) -> bool:
     net = drivers.net[b]
     car = drivers.car[b, n]
     row = roads.vert_off[net] + lane_end(roads, net, car.lane)
-    found = False
+    free = False
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
         on = out != car.lane ^ 1 and leads_out(b, car.lane, out, traffic)
         if on and (full or is_free(b, n, out, traffic)):
             car.next_lane = out
-            found = True
-    return found
+            free = True
+    return free
 
 
 @jit_rare
@@ -161,11 +161,11 @@ def is_way_on_free(b: int, n: int, traffic: Traffic) -> bool:
     net = drivers.net[b]
     car = drivers.car[b, n]
     row = roads.vert_off[net] + lane_end(roads, net, car.lane)
-    found = False
+    free = False
     for k in range(roads.degree[row]):
         out = int(roads.arms[row, k])
-        found = found or (out != car.lane ^ 1 and is_free(b, n, out, traffic))
-    return found
+        free = free or (out != car.lane ^ 1 and is_free(b, n, out, traffic))
+    return free
 
 
 @jit_rare
@@ -173,10 +173,10 @@ def turn_elsewhere(b: int, n: int, tick: int, traffic: Traffic) -> None:
     """Choose another exit for a car that is held up in a disc."""
     drivers = traffic.drivers
     car = drivers.car[b, n]
-    found = take_another(b, n, tick, INFINITE, traffic)
-    if not found and not is_open(b, n, car.next_lane, traffic):
-        found = take_last_resort(b, n, traffic)
-    if found:
+    turns = take_another(b, n, tick, INFINITE, traffic)
+    if not turns and not is_open(b, n, car.next_lane, traffic):
+        turns = take_last_resort(b, n, traffic)
+    if turns:
         car.waited = 0
 
 

@@ -92,13 +92,13 @@ def is_passed(b: int, n: int, labels: Labels, traffic: Traffic) -> bool:
     """Tell whether another e-agent is passing a car, which would keep it on the left if it drove off now."""
     state = traffic.state
     far = PASSES * traffic.drivers.vehicle[b].reach
-    found = False
+    passed = False
     for j in range(1, state.count[b]):
         dx = state.x[b, j] - state.x[b, n]
         dy = state.y[b, j] - state.y[b, n]
         near = j != n and labels.lane[b, j] == labels.lane[b, n] and dx * dx + dy * dy < far * far
-        found = found or (near and np.int64(labels.bits[b, j]) & FLAG.LEFT != 0)
-    return found
+        passed = passed or (near and np.int64(labels.bits[b, j]) & FLAG.LEFT != 0)
+    return passed
 
 
 @jit_inline

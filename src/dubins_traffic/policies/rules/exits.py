@@ -73,10 +73,10 @@ def is_goal(v: int, car: Driver, drivers: Drivers) -> bool:
     """Tell whether v is among the goals that the car knows."""
     if car.kind == KIND.LOOP:
         return False
-    found = False
+    goal = False
     for k in range(car.first, car.last):
-        found = found or drivers.stage[k] == v
-    return found
+        goal = goal or drivers.stage[k] == v
+    return goal
 
 
 @jit_inline
@@ -148,10 +148,10 @@ def aim(b: int, n: int, tick: int, v: int, traffic: Traffic) -> bool:
         return False
     if seeks_loop:
         forget(net, roads, scratch)
-        found = 0
+        targets = 0
         for k in range(car.first, car.last):
-            found = aim_for(drivers.stage[k], scratch.hops, scratch.queue, found)
-        spread(roads, net, scratch.hops, scratch.queue, found)
+            targets = aim_for(drivers.stage[k], scratch.hops, scratch.queue, targets)
+        spread(roads, net, scratch.hops, scratch.queue, targets)
         return True
     seek(net, car.goal, roads, scratch)
     if kind == KIND.NEMESIS:
@@ -171,10 +171,10 @@ def seek(net: int, v: int, roads: RoadTable, scratch: Scratch) -> None:
     """Fill `scratch.hops` with the number of lanes from each lane to intersection v."""
     forget(net, roads, scratch)
     row = int(roads.vert_off[net]) + v
-    found = 0
+    targets = 0
     for k in range(roads.degree[row]):
-        found = aim_for(roads.arms[row, k] ^ 1, scratch.hops, scratch.queue, found)
-    spread(roads, net, scratch.hops, scratch.queue, found)
+        targets = aim_for(roads.arms[row, k] ^ 1, scratch.hops, scratch.queue, targets)
+    spread(roads, net, scratch.hops, scratch.queue, targets)
 
 
 @jit_rare
@@ -201,10 +201,10 @@ def seek_ego(b: int, net: int, traffic: Traffic) -> None:
     if count == 0:
         return
     forget(net, roads, scratch)
-    found = 0
+    targets = 0
     for k in range(count):
-        found = aim_for(scratch.chain[k], scratch.hops, scratch.queue, found)
-    spread(roads, net, scratch.hops, scratch.queue, found)
+        targets = aim_for(scratch.chain[k], scratch.hops, scratch.queue, targets)
+    spread(roads, net, scratch.hops, scratch.queue, targets)
 
 
 @jit_rare

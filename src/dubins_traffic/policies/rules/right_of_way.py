@@ -138,10 +138,10 @@ def moves_up(b: int, n: int, v: int, degree: Any, traffic: Traffic) -> bool:
 @jit_inline
 def minds_goal(v: int, car: Driver, drivers: Drivers) -> bool:
     """Tell whether the intersection v is a goal that the car is to leave free again and again (E6)."""
-    found = False
+    minds = False
     for k in range(car.goal_first, car.goal_last):
-        found = found or drivers.stage[k] == v
-    return found
+        minds = minds or drivers.stage[k] == v
+    return minds
 
 
 @jit_inline

@@ -53,7 +53,7 @@ def surely_stands(b: int, n: int, here: float, way: ReferencePath, traffic: Traf
     if drivers.car[b, n].watched * vehicle.period < vehicle.stand_time + vehicle.period:
         return False
     watch_x, watch_y = drivers.car[b, n].watch_x, drivers.car[b, n].watch_y
-    found = False
+    stands = False
     j = scratch.head[lane >> 1]
     while j >= 0:
         bits = labels.bits[b, j]
@@ -65,9 +65,9 @@ def surely_stands(b: int, n: int, here: float, way: ReferencePath, traffic: Traf
             left = aside(way, float(state.x[b, j]), float(state.y[b, j])) - vehicle.middle
             half = half_across(b, j, way.tx, way.ty, state, vehicle)
             if here - vehicle.behind + SURE < key < here + vehicle.fore - SURE:
-                found = found or narrows(left - half, left + half, 2.0 * vehicle.middle, vehicle.needed)
+                stands = stands or narrows(left - half, left + half, 2.0 * vehicle.middle, vehicle.needed)
         j = scratch.link[j]
-    return found
+    return stands
 
 
 @jit_rare

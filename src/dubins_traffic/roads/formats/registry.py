@@ -148,8 +148,8 @@ def of_suffix(path: str | Path, further: MapFormat | None = None) -> WritesMaps 
     """
     name = Path(path).name.lower().removesuffix(GZIP)
     forms = chain([] if further is None else [further], registered())
-    found = [(form, suffix) for form in forms if isinstance(form, WritesMaps) for suffix in form.suffixes]
-    fitting = [(form, suffix) for form, suffix in found if name.endswith(suffix)]
+    writers = [(form, suffix) for form in forms if isinstance(form, WritesMaps) for suffix in form.suffixes]
+    fitting = [(form, suffix) for form, suffix in writers if name.endswith(suffix)]
     return max(fitting, key=lambda pair: len(pair[1]))[0] if fitting else None
 
 

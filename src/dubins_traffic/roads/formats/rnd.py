@@ -172,8 +172,8 @@ def checked_corners(value: object, count: int) -> tuple[Corners, ...]:
     if rows is None or len(rows) not in (0, count):
         expected = f"corners [x, y, radius] for each of the {count} segments, or none"
         raise InputError("not a list", field="corners", value=value, expected=expected)
-    found = tuple(_corners(_row(entry), s, entry) for s, entry in enumerate(rows))
-    return found if any(found) else ()
+    corners = tuple(_corners(_row(entry), s, entry) for s, entry in enumerate(rows))
+    return corners if any(corners) else ()
 
 
 def _bent(value: object) -> tuple[tuple[Segment, ...], tuple[Corners, ...]]:
@@ -218,14 +218,14 @@ def _corners(row: list[Any] | None, s: int, entry: Any) -> Corners:
     if triples is None or len(triples) > MOST_CORNERS:
         expected = f"at most {MOST_CORNERS} corners [x, y, radius]"
         raise InputError("not corners", field=f"segments[{s}]", value=entry, expected=expected)
-    found: list[tuple[float, float, float]] = []
+    corners: list[tuple[float, float, float]] = []
     for k, triple in enumerate(triples):
         right = triple is not None and len(triple) == 3 and all(is_finite(number) for number in triple)
         if triple is None or not right or max(abs(number) for number in triple) > LARGEST_POINT or triple[2] <= 0:
             expected = f"[x, y, radius], a radius above 0, numbers up to {LARGEST_POINT}"
             raise InputError(f"corner {k}: not a corner", field=f"segments[{s}]", value=triple, expected=expected)
-        found.append((_plain(triple[0]), _plain(triple[1]), _plain(triple[2])))
-    return tuple(found)
+        corners.append((_plain(triple[0]), _plain(triple[1]), _plain(triple[2])))
+    return tuple(corners)
 
 
 def _plain(number: Any) -> float:
@@ -287,12 +287,12 @@ def parse_json(text: str, file: str | None = None) -> dict[str, Any]:
     """Return the JSON object in `text`; keys given twice, NaN and infinities are refused."""
 
     def unique(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found: dict[str, Any] = {}
+        document: dict[str, Any] = {}
         for key, value in pairs:
-            if key in found:
+            if key in document:
                 raise InputError("key given twice", file=file, field=key)
-            found[key] = value
-        return found
+            document[key] = value
+        return document
 
     def constant(name: str) -> Any:
         raise InputError("not a JSON number", file=file, value=name, expected="a finite number")

@@ -16,7 +16,7 @@ def is_xml(text: str) -> bool:
 def root_name(text: str) -> str:
     """Return the name of the root element, from the beginning of a text; empty if it does not begin as XML does."""
     at = 1 if text.startswith("\ufeff") else 0
-    while found := _BEFORE_ROOT.match(text, at):
-        at = found.end()
+    while match := _BEFORE_ROOT.match(text, at):
+        at = match.end()
     name = _NAME.match(text, at)
     return name[1] if name else ""
