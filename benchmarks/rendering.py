@@ -23,7 +23,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.problem.instance import Problem
 from dubins_traffic.viewer import palette
-from dubins_traffic.viewer.bodies import nose, outline
+from dubins_traffic.viewer.shapes import nose, outline
 
 SIDE, CARS, FRAMES, PLOTTED, ROUNDS = 400, 8, 2000, 20, 5
 LEAST, TIMES = 2000.0, 10.0

@@ -28,7 +28,7 @@ CASES = (
 LOOKS = {
     "cars.near._is_known",
     "policies.rules.command_cache.repeat_command",
-    "policies.rules.path_cache._is_of",
+    "policies.rules.command_cache._is_of",
     "rules.label_cache.relabel_from_cache",
     "rules.location._is_in",
     "rules.referee_kernel._is_as_before",

@@ -24,8 +24,7 @@ from dubins_traffic.campaign import manifest
 from dubins_traffic.campaign.columns import REPORTED, SCORES
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.conclusion import conclusion
-from dubins_traffic.campaign.report.latex import latex_table
-from dubins_traffic.campaign.report.write import page, write_report
+from dubins_traffic.campaign.report.write import latex_table, page, write_report
 from dubins_traffic.campaign.results import load_results
 from dubins_traffic.campaign.run_campaign import run_campaign
 from dubins_traffic.cli.main import main

@@ -13,8 +13,7 @@ from dubins_traffic.problem.instance import Instance
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators.embedded import Embedded
-from dubins_traffic.trial.run import run
-from dubins_traffic.trial.trial import Trial
+from dubins_traffic.trial.trial import Trial, run
 from tests.property.test_shield_return import FASTEST, PERIOD, START, Sides, along, standing
 from tests.unit.test_law import W, broken, on_grid
 

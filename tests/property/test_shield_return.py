@@ -22,8 +22,7 @@ from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.shield.tables import Overtakes
 from dubins_traffic.simulators.embedded import Embedded
-from dubins_traffic.trial.run import run
-from dubins_traffic.trial.trial import Trial
+from dubins_traffic.trial.trial import Trial, run
 from tests.property.test_shield import PHASES, Phase, Phases
 from tests.unit.test_law import TURN, W, broken, car, on_grid, turned
 

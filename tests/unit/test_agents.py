@@ -5,11 +5,10 @@ import math
 import numpy as np
 import pytest
 
-from dubins_traffic.agents.registry import names
 from dubins_traffic.cars.body import Bounds, Car, DiscObstacle, PolygonObstacle, Rectangle
 from dubins_traffic.cars.state import Pose
 from dubins_traffic.errors import InputError
-from dubins_traffic.problem.kinds import KINDS
+from dubins_traffic.problem.kinds import KINDS, names
 from dubins_traffic.roads.network import RoadNetwork
 from tests.batches import pose
 from tests.fleets import AWAY, GRID, first_commands, in_lane, instance, run

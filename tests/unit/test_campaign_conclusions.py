@@ -17,8 +17,8 @@ from dubins_traffic.campaign.report import across, terminal
 from dubins_traffic.campaign.report.comparison import Comparison
 from dubins_traffic.campaign.report.comparison import compare as compare_rows
 from dubins_traffic.campaign.report.conclusion import conclusion
-from dubins_traffic.campaign.report.latex import escaped, latex_table
 from dubins_traffic.campaign.report.worst import Bad
+from dubins_traffic.campaign.report.write import escaped, latex_table
 from dubins_traffic.cli.main import main
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.scoring.score import Score, Scorer

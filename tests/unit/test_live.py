@@ -14,10 +14,10 @@ import pytest
 from dubins_traffic.cars.state import Labels, Propositions, State
 from dubins_traffic.live import player
 from dubins_traffic.live.access import Access, Door, RefusedError
+from dubins_traffic.live.feed import FREE, turn_of
 from dubins_traffic.live.player import LeftError, Player, Wheel
 from dubins_traffic.live.playing import sentence, standings
 from dubins_traffic.live.show import CHUNK, Show
-from dubins_traffic.live.turn import FREE, turn_of
 from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.rules.propositions import FLAG

@@ -11,9 +11,8 @@ from onnx import TensorProto, helper
 
 from dubins_traffic import draw, load_config, run_trial
 from dubins_traffic.errors import InputError
-from dubins_traffic.learning.actions import CHOICES
 from dubins_traffic.learning.onnx_policy import MOST, OnnxPolicy
-from dubins_traffic.learning.policy import Learned, Policy, load
+from dubins_traffic.learning.policy import CHOICES, Learned, Policy, load
 from tests.onnx_models import exported, product, written
 
 ROOT = Path(__file__).parents[2]

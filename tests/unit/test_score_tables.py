@@ -16,13 +16,13 @@ from dubins_traffic.campaign.notice import assumption_notice
 from dubins_traffic.campaign.report import terminal, worst
 from dubins_traffic.campaign.report.comparison import Comparison, compare
 from dubins_traffic.campaign.report.write import page
-from dubins_traffic.cli import costs, tables
+from dubins_traffic.cli import tables
 from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.sink import BY_CONTROLLER
 from dubins_traffic.roads.network import RoadNetwork
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.collisions import Collision
-from dubins_traffic.scoring.duration import ran_whole
+from dubins_traffic.scoring.counts import ran_whole
 from dubins_traffic.scoring.paper import network_size, paper_score
 from dubins_traffic.scoring.score import Score, Scorer, ScoreSheet
 from dubins_traffic.scoring.verdict import Excuse, Place, Ruling, Verdict, Violation, is_clean, was_cut
@@ -305,15 +305,15 @@ def judged(trial: int, *breaches: Violation, **changes: Any) -> Score:
 def test_below_the_table_stands_what_cost_most_and_where_to_look():
     first = judged(0, own("3.stop", 2.0), BREACH, own("2.left", 9.0))
     second = judged(1, own("3.clear", 1.0), own("2.left", 4.77), record="out/trial 1.mcap")
-    said, kept = costs.worst(ScoreSheet((first, second)))
+    said, kept = tables.worst(ScoreSheet((first, second)))
     assert said == "Cost most: 2.left, 2 times, first in trial 0 at 9.00 s."
     assert "--records" in kept
-    said, see = costs.worst(ScoreSheet((second,)))
+    said, see = tables.worst(ScoreSheet((second,)))
     assert said == "Cost most: 3.clear, once, in trial 1 at 1.00 s."
     assert see == "To see it: dubins-traffic replay 'out/trial 1.mcap' --at 0.00"
 
 
 def test_below_a_table_without_breaches_or_of_several_controllers_stands_nothing():
-    assert costs.worst(ScoreSheet((judged(0, BREACH),))) == []
+    assert tables.worst(ScoreSheet((judged(0, BREACH),))) == []
     several = judged(0, own("2.left", 1.0)), judged(0, own("2.left", 1.0), controller="simple")
-    assert costs.worst(ScoreSheet(several)) == []
+    assert tables.worst(ScoreSheet(several)) == []

@@ -13,8 +13,8 @@ from dubins_traffic.protocols import End, Ending
 from dubins_traffic.record.wall import measured
 from dubins_traffic.rules.propositions import FLAG
 from dubins_traffic.scoring.collisions import collisions_of
+from dubins_traffic.scoring.counts import early_rounds
 from dubins_traffic.scoring.driving import Driven, driven_of
-from dubins_traffic.scoring.duration import early_rounds
 from dubins_traffic.scoring.findings import Findings
 from dubins_traffic.scoring.goals import GoalVisits, Visits
 from dubins_traffic.scoring.judging import Judging

@@ -28,8 +28,7 @@ from dubins_traffic.envs.episodes import Levels
 from dubins_traffic.envs.parallel_vector import TrafficParallelVectorEnv
 from dubins_traffic.envs.stable_baselines import vec_env
 from dubins_traffic.envs.vector import TrafficVectorEnv
-from dubins_traffic.learning.actions import CHOICES
-from dubins_traffic.learning.policy import Policy
+from dubins_traffic.learning.policy import CHOICES, Policy
 
 CONFIG, CARS, SKIP, ENVS, LEVELS = "junction", 3, 6, 64, 200
 """What is learned, other cars that are shown, ticks of an action, environments at once, road networks to learn on."""

@@ -15,11 +15,11 @@ from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.reader import Record
 from dubins_traffic.roads.network import RoadNetwork
-from dubins_traffic.viewer.bodies import poses_at
 from dubins_traffic.viewer.figures import STYLE, matplotlib, write_figure
 from dubins_traffic.viewer.marks import breach_marks, contact_mark
 from dubins_traffic.viewer.paths import Paths
 from dubins_traffic.viewer.scene import obstacle_points
+from dubins_traffic.viewer.shapes import poses_at
 
 if TYPE_CHECKING:
     from dubins_traffic.scoring.score import Score

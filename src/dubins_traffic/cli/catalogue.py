@@ -13,11 +13,11 @@ from typing import Any, Final
 
 from pydantic_core import PydanticUndefined
 
-from dubins_traffic.agents.registry import names as agent_names
 from dubins_traffic.cars.dynamics import names as car_model_names
 from dubins_traffic.controllers.registry import names as controller_names
 from dubins_traffic.problem.configuration import Configuration, load_config, shipped_names
 from dubins_traffic.problem.kinds import COUNTER, FREE, KEEP_RULES, KINDS, REMOTE
+from dubins_traffic.problem.kinds import names as agent_names
 from dubins_traffic.roads.formats.registry import names as format_names
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.scoring.registry import columns

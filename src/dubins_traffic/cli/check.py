@@ -1,4 +1,4 @@
-"""`dubins-traffic check`."""
+"""`dubins-traffic check` and `dubins-traffic score`: recorded trials are judged, or scored, again."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from dubins_traffic.scoring.score import Score
     from dubins_traffic.scoring.verdict import Verdict
     from dubins_traffic.synthesis.related import Relation
+
 
 EXAMPLES = options.examples(
     "check out/*.mcap",
@@ -194,3 +195,23 @@ def _breaches(verdict: Verdict) -> Table:
         x, y = f"{entry.where.x:.2f}", f"{entry.where.y:.2f}"
         table.add_row(f"{entry.time:.3f}", f"{entry.since:.3f}", entry.car, entry.rule, x, y)
     return table
+
+
+SCORE_EXAMPLES = options.examples(
+    "score out/*.mcap", "score out/trial-0000.mcap --json", "score out/*.mcap --metric time_to_collision"
+)
+
+
+def score(
+    records: Annotated[list[str], typer.Argument(metavar="RECORD...", help="Records, `*.mcap`.", show_default=False)],
+    metric: options.Metrics = None,
+    json: options.Json = False,
+) -> None:
+    """Score recorded trials, with the same code as `run` does live."""
+    from dubins_traffic.cli.tables import show
+    from dubins_traffic.runs.sources import load_record
+    from dubins_traffic.scoring.score import ScoreSheet
+    from dubins_traffic.scoring.score import score as score_record
+
+    scores = (score_record(load_record(record), metric or ()) for record in records)
+    show(ScoreSheet(tuple(scores)), json=json)

@@ -22,14 +22,12 @@ from dubins_traffic.cli import (
     gazebo,
     instance,
     listing,
-    messages,
     network,
     play,
     plot,
     replay,
     run,
     sandbox,
-    score,
     serve,
     session,
     spec,
@@ -85,7 +83,7 @@ app.command("run", epilog=run.EXAMPLES)(run.run)
 app.command("watch", epilog=watch.EXAMPLES)(watch.watch)
 app.command("play", epilog=play.EXAMPLES)(play.play)
 app.command("batch", epilog=batch.EXAMPLES)(batch.batch)
-app.command("score", epilog=score.EXAMPLES)(score.score)
+app.command("score", epilog=check.SCORE_EXAMPLES)(check.score)
 app.command("check", epilog=check.EXAMPLES)(check.check)
 app.command("explain", epilog=explain.EXAMPLES)(explain.explain)
 app.command("verify", epilog=verify.EXAMPLES)(verify.verify)
@@ -105,8 +103,8 @@ app.add_typer(suite.suite, name="suite")
 app.command("evaluate", epilog=evaluate.EXAMPLES)(evaluate.evaluate)
 app.command("template", epilog=template.EXAMPLES)(template.template)
 transports = {name: session.app(name, entry) for name, entry in TRANSPORTS.items()}
-transports["ros1"].command("messages", epilog=messages.ROS1_EXAMPLES)(messages.ros1)
-transports["lcm"].command("messages", epilog=messages.LCM_EXAMPLES)(messages.lcm)
+transports["ros1"].command("messages", epilog=template.ROS1_EXAMPLES)(template.ros1)
+transports["lcm"].command("messages", epilog=template.LCM_EXAMPLES)(template.lcm)
 app.add_typer(gazebo.app, name="gazebo")
 app.add_typer(sandbox.app, name="sandbox")
 for name, transport in transports.items():

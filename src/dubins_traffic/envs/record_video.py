@@ -10,7 +10,7 @@ from typing import Any, Final, SupportsFloat
 import gymnasium
 import numpy as np
 
-from dubins_traffic.animation.video import Video
+from dubins_traffic.animation.animate import Video
 from dubins_traffic.errors import InputError
 
 SUFFIX: Final = ".mp4"

@@ -16,8 +16,8 @@ from dubins_traffic.envs.episodes import Episodes, Levels
 from dubins_traffic.envs.terms import weights_of
 from dubins_traffic.errors import InputError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.learning.actions import CHOICES
 from dubins_traffic.learning.flat import SHOWN, Layout
+from dubins_traffic.learning.policy import CHOICES
 from dubins_traffic.problem.configuration import Configuration, load_config
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.verification.worlds import with_formulas
@@ -33,7 +33,7 @@ class ActionMap:
     ----------
     kind : str
         ``continuous``: two numbers from -1 to 1, speed and yaw rate, scaled to the car's bounds. ``discrete``: one of
-        `learning.actions.CHOICES`.
+        `learning.policy.CHOICES`.
 
     Attributes
     ----------

@@ -22,9 +22,8 @@ import numpy.typing as npt
 from dubins_traffic.cars.state import Command, Observation
 from dubins_traffic.errors import InputError, MissingExtraError
 from dubins_traffic.kernels.arrays import Floats
-from dubins_traffic.learning.actions import CHOICES
 from dubins_traffic.learning.flat import SHOWN
-from dubins_traffic.learning.policy import Learned
+from dubins_traffic.learning.policy import CHOICES, Learned
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem

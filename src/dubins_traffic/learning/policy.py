@@ -21,6 +21,7 @@ from dubins_traffic.learning.flat import FlatObserver
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Problem
 
+
 FORMAT: Final = "dubins-traffic policy"
 """Value of the array `format` in a policy's file."""
 MOST: Final = 1 << 24
@@ -227,3 +228,12 @@ class Learned:
 def player(path: str | Path) -> Learned:
     """Return the controller of the policy in a file."""
     return Learned(load(path))
+
+
+SPEEDS: Final = (0.0, 0.5, 1.0)
+"""Speeds of discrete actions: from the middle of the car's range (0 where it may reverse) to its top speed."""
+TURNS: Final = (-1.0, -0.25, 0.0, 0.25, 1.0)
+"""Yaw rates of discrete actions, as shares of the top yaw rate; action ``5 j + k`` is speed j and turn k."""
+CHOICES: Final[Floats] = np.array([(speed, turn) for speed in SPEEDS for turn in TURNS])
+"""Both shares of each discrete action, (15, 2)."""
+CHOICES.flags.writeable = False

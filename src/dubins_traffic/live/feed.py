@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from time import monotonic, sleep
 from typing import Any, Final, Protocol
 
 import numpy as np
 
-from dubins_traffic.cars.state import EGO, Contact, Frames, Labels, Observation, State
-from dubins_traffic.controllers.navigator import Navigator
+from dubins_traffic.cars.state import EGO, Contact, Frames, Labels, Observation, Propositions, State
+from dubins_traffic.controllers.navigator import Navigator, Situation
 from dubins_traffic.live.show import Show
-from dubins_traffic.live.turn import Turn, turn_of
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
 from dubins_traffic.rules.referee import Referee
@@ -26,6 +25,37 @@ from dubins_traffic.viewer.marks import (
     visit_mark,
 )
 from dubins_traffic.viewer.replay import document_of, mark_of, origin_of, shown_summary
+
+NEAR: Final = 1.5
+"""Metres before the line from which a driver is told of a crossing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """What the ego has to do at the crossing ahead, in a word (free, stop, wait, go) and in a sentence."""
+
+    state: str
+    text: str
+
+
+FREE: Final = Turn("free", "")
+"""Nothing: there is no crossing near."""
+
+
+def turn_of(propositions: Propositions, here: Situation) -> Turn:
+    """Return whose turn it is (docs/rules.md#queue), as far as the ego can see."""
+    if here.stop_line <= 0.0 or not here.crossing or here.stop_line > NEAR:
+        return FREE
+    if not propositions.stopped:
+        return Turn("stop", "Stop at the line before the crossing")
+    if propositions.ahead:
+        names = ", ".join(car.name for car in here.before) or "another car"
+        return Turn("wait", f"Wait: {names} before you")
+    if not propositions.clear:
+        names = ", ".join(car.name for car in here.inside) or "another car"
+        return Turn("wait", f"Wait: {names} in the crossing")
+    return Turn("go", "Your turn: go")
+
 
 FALLEN_BEHIND: Final = 0.5
 """Seconds by which a trial may be late before the time that was lost is given up."""

@@ -347,3 +347,8 @@ def parameters_of(kind: str, given: Mapping[str, Any]) -> dict[str, Any]:
 def loops(kind: str, parameters: Mapping[str, Any]) -> bool:
     """Tell whether an e-agent of `kind` drives round a cycle."""
     return kind == "loop" or (kind in ("lawful", "chosen") and parameters["goes"] == "loop")
+
+
+def names() -> Mapping[str, str]:
+    """Return the kinds of e-agents, each with one line that says what it does."""
+    return {name: (model.__doc__ or "").strip().splitlines()[0] for name, model in KINDS.items()}

@@ -1,7 +1,7 @@
 """What is too near in a network of roads, compiled: intersections, roads beside them, roads that cross or meet sharply.
 
-What is near is found by cells (`roads.buckets`) as wide as the longest of the pieces that are compared; which of it is
-too near is told by the exact comparisons of each.
+What is near is found by hashed cells as wide as the longest of the pieces that are compared; which of it is too near
+is told by the exact comparisons of each.
 """
 
 from __future__ import annotations
@@ -18,11 +18,37 @@ from dubins_traffic.kernels.calls import bound
 from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.roads.buckets import Bucket, bucket_of, buckets, empty
 from dubins_traffic.roads.room import Clearances
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+
+@record
+class Bucket:
+    """The items of all cells with one hash."""
+
+    first: int = -1
+    """Number of the first item, which names the next; -1 if there is none."""
+
+
+def buckets(items: int) -> Rows[Bucket]:
+    """Return empty buckets for so many items."""
+    return table(Bucket, 1 << max(items, 8).bit_length())
+
+
+@jit
+def bucket_of(buckets: Rows[Bucket], column: int, row: int) -> int:
+    """Return the number of the bucket that holds what is in a cell, its `column` (number) and `row` (number)."""
+    return (column * 73_856_093 ^ row * 19_349_663) & (buckets.shape[0] - 1)
+
+
+@jit
+def empty(buckets: Rows[Bucket]) -> None:
+    """Take all items out of the buckets."""
+    for k in range(buckets.shape[0]):
+        buckets[k].first = -1
+
 
 ROUNDING = 1e-9
 """By how much lengths and cosines may fall short."""

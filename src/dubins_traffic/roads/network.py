@@ -29,7 +29,7 @@ from dubins_traffic.roads.formats import registry as formats
 from dubins_traffic.roads.formats import rnd
 from dubins_traffic.roads.formats.registry import MapFormat
 from dubins_traffic.roads.formats.rnd import write_json, write_lines
-from dubins_traffic.roads.queries import coordinates, nearest
+from dubins_traffic.roads.lookup import coordinates, nearest
 from dubins_traffic.roads.room import LARGEST_DEGREE
 from dubins_traffic.roads.table import CellGrid, Piece, RoadTable, Vertex
 from dubins_traffic.roads.table import Segment as SegmentRow

@@ -15,8 +15,7 @@ from dubins_traffic.kernels.compile import jit
 from dubins_traffic.kernels.records import Rows, record, table
 from dubins_traffic.kernels.stream import Stream, next_below, next_uniform, set_stream, shuffle
 from dubins_traffic.kernels.tables import Tables
-from dubins_traffic.roads.buckets import Bucket, bucket_of, buckets, empty
-from dubins_traffic.roads.closeness import ROUNDING
+from dubins_traffic.roads.closeness import ROUNDING, Bucket, bucket_of, buckets, empty
 from dubins_traffic.roads.room import LARGEST_DEGREE, Clearances
 
 if TYPE_CHECKING:

@@ -22,8 +22,8 @@ from dubins_traffic.scoring import registry as scores
 from dubins_traffic.scoring.metric import MetricSpec
 from dubins_traffic.scoring.score import Score, Scorer
 from dubins_traffic.simulators import registry as simulators
-from dubins_traffic.trial.run import run
 from dubins_traffic.trial.trial import Trial as BareTrial
+from dubins_traffic.trial.trial import run
 from dubins_traffic.viewer.notebook import trial_html
 from dubins_traffic.viewer.paths import Paths
 

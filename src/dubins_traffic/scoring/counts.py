@@ -1,10 +1,13 @@
-"""What is counted of a trial, its rounds and its goals: rows of a tally."""
+"""What is counted of a trial, its rounds and its goals, and whether it ran its whole planned duration."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from dubins_traffic.kernels.records import record
+from dubins_traffic.problem.instance import Instance
+from dubins_traffic.record.sink import End, Ending
+from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 
 @record
@@ -77,3 +80,38 @@ class GoalCounts:
     """1 if its first visit was in frame 0."""
     fresh: int = 1
     """1 if coming into its disc is a visit: there was none yet, or the ego has been in another disc since."""
+
+
+def planned_ticks(instance: Instance) -> int:
+    """Return the number of ticks of a trial that runs to its planned end, at least 1."""
+    return max(1, instance.ticks)
+
+
+def ran_whole(instance: Instance, ending: Ending | None, last: int) -> bool:
+    """Tell whether a trial ran its whole planned duration.
+
+    Parameters
+    ----------
+    instance : Instance
+        The instance that was run.
+    ending : Ending or None
+        How the trial ended; None while it runs, and for a record that was cut off.
+    last : int
+        Number of the last frame that there is.
+    """
+    return ending is not None and ending.end is End.DURATION and min(ending.ticks, last) >= planned_ticks(instance)
+
+
+def early_rounds(early: RoundCount, goals: int, ending: Ending | None) -> float:
+    """Return the rounds before the first breach, with the share of the `goals` goals of the round begun.
+
+    0 without goals, or if the controller ended the trial. Norm: docs/rules.md#before-breach.
+    """
+    by_controller = ending is not None and ending.by_controller
+    return early.rounds + early.goals / goals if goals and not by_controller else 0.0
+
+
+COLUMNS = (
+    ScoreColumn(Column("duration_s", "duration", "s"), lambda score: score.duration_s),
+    ScoreColumn(Column("counted_rounds", "counted rounds", "", 1, "int32"), lambda score: score.counted_rounds),
+)

@@ -13,8 +13,7 @@ from dubins_traffic.rules.breach_log import EntryMargins
 from dubins_traffic.rules.parameters import RuleParameters
 from dubins_traffic.rules.referee import Breach, Pending
 from dubins_traffic.scoring.collisions import Collision
-from dubins_traffic.scoring.counts import GoalCounts, TrialCounts
-from dubins_traffic.scoring.duration import ran_whole
+from dubins_traffic.scoring.counts import GoalCounts, TrialCounts, ran_whole
 from dubins_traffic.scoring.goals import Visits, visits_of
 from dubins_traffic.scoring.margins import EgoMargins, entries_by_rule, margins_by_rule
 from dubins_traffic.scoring.tally import Tally

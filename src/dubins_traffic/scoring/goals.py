@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from dubins_traffic.problem.instance import Instance
-from dubins_traffic.scoring.duration import planned_ticks
+from dubins_traffic.scoring.counts import planned_ticks
 from dubins_traffic.scoring.metric import Column, ScoreColumn
 
 if TYPE_CHECKING:

@@ -20,8 +20,8 @@ from dubins_traffic.record.wall import Wall
 from dubins_traffic.scoring import registry
 from dubins_traffic.scoring.blocks import joined
 from dubins_traffic.scoring.collisions import Collision, collisions_of
+from dubins_traffic.scoring.counts import early_rounds
 from dubins_traffic.scoring.driving import Driven, driven_of
-from dubins_traffic.scoring.duration import early_rounds
 from dubins_traffic.scoring.findings import Findings
 from dubins_traffic.scoring.formulas import FormulaVerdict, FormulaVerdicts
 from dubins_traffic.scoring.goals import GoalVisits

@@ -17,7 +17,7 @@ from dubins_traffic.rules.exceptions import Exceptions
 from dubins_traffic.rules.parameters import EDITION, RuleParameters
 from dubins_traffic.rules.tables import ticks
 from dubins_traffic.scoring.collisions import Collision
-from dubins_traffic.scoring.duration import planned_ticks
+from dubins_traffic.scoring.counts import planned_ticks
 from dubins_traffic.scoring.formulas import Status
 from dubins_traffic.scoring.goals import Visits
 

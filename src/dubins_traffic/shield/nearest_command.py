@@ -16,8 +16,8 @@ import numpy as np
 from dubins_traffic.cars.state import EGO, Command, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.kernels.compile import jit, jit_inline
-from dubins_traffic.policies.rules.lists import list_cars, unlist_cars
 from dubins_traffic.policies.rules.passing import along, find_way_past, passing_time
+from dubins_traffic.policies.rules.seeing import list_cars, unlist_cars
 from dubins_traffic.policies.rules.tables import Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import way_between
 from dubins_traffic.policies.rules.unrolled import bends_ahead, put_back, unroll

@@ -12,13 +12,15 @@ from dubins_traffic.cars.state import EGO, NONE, Contact, Event, Observation
 from dubins_traffic.errors import ControllerError, DubinsTrafficError, InputError
 from dubins_traffic.kernels.calls import bound
 from dubins_traffic.observations.senses import Senses
-from dubins_traffic.protocols import Draws, Driver, End, Ending, Reports, Scans, Simulator, Sink, Watcher
+from dubins_traffic.protocols import Controller, Draws, Driver, End, Ending, Reports, Scans, Simulator, Sink, Watcher
+from dubins_traffic.record.wall import Wall, measured, summary
 from dubins_traffic.rules.labeller import Labeller
 from dubins_traffic.trial.buffer import FrameBuffer, all_finite
 from dubins_traffic.trial.disturbance import CommandLine
 from dubins_traffic.trial.endings import agent_fault, collision_detail
 from dubins_traffic.trial.forking import forked, reseeded
-from dubins_traffic.trial.interrupts import WHOLE
+from dubins_traffic.trial.interrupts import WHOLE, heard_between_frames
+from dubins_traffic.trial.seat import Seat
 
 if TYPE_CHECKING:
     from dubins_traffic.problem.instance import Instance
@@ -236,3 +238,25 @@ class Trial:
             if EGO in (contact.car, contact.other):
                 self.end(End.COLLISION, collision_detail(self.instance, contact))
                 return
+
+
+def run(trial: Trial, controller: Controller, deadline: float | None = None) -> tuple[Ending, Wall]:
+    """Run `controller` through `trial` until it ends and return its ending and wall-clock figures.
+
+    A controller that raises, gives up (None), answers nonsense, or takes longer than `deadline` seconds for one
+    `act` ends its own trial with a named reason; nothing is raised but what interrupts the program.
+    """
+    seat = Seat(controller, deadline, linked=trial.linked)
+    with heard_between_frames():
+        try:
+            seat.start(trial.instance.problem, trial.tick)
+            act, advance, note = seat.act, trial.advance, trial.note
+            while trial.ending is None:
+                advance(act(trial.observation, note))
+        except (KeyboardInterrupt, SystemExit):
+            trial.end(End.INTERRUPTED)
+            raise
+        except ControllerError as error:
+            trial.end(End(error.reason), error.detail)
+    ending = seat.end(trial.end(End.DURATION))
+    return ending, measured(seat.begin, summary(seat.latencies), reproducible=ending.end is not End.DEADLINE)

@@ -10,7 +10,7 @@ from dubins_traffic.cars.state import Frames, Pose
 from dubins_traffic.kernels.arrays import Floats
 from dubins_traffic.problem.instance import Instance
 from dubins_traffic.record.sink import Ending
-from dubins_traffic.viewer.bodies import poses_at
+from dubins_traffic.viewer.shapes import poses_at
 
 STEPS = 400
 """Most points of a way, about."""

@@ -1,6 +1,6 @@
 """The tables of the path cache and the command cache.
 
-`policies.rules.path_cache` and `policies.rules.command_cache` write and read it.
+`policies.rules.command_cache` writes and reads them.
 """
 
 from __future__ import annotations

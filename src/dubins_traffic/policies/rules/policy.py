@@ -24,22 +24,24 @@ from dubins_traffic.policies.rules.command_cache import (
     drive_freely,
     forget_command,
     repeat_command,
+    way_of,
 )
 from dubins_traffic.policies.rules.exits import count_visit, take_lane, ticks_of, watch_ego
 from dubins_traffic.policies.rules.leaning import lean
-from dubins_traffic.policies.rules.lists import LISTED, enlist, unlist_cars
 from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import PASSING_WAIT, find_way_past, keep_off
-from dubins_traffic.policies.rules.path_cache import way_of
 from dubins_traffic.policies.rules.returning import keep_passing
 from dubins_traffic.policies.rules.right_of_way import before_ego, kept_out_for_long, yield_at_line
 from dubins_traffic.policies.rules.room import is_pressed
 from dubins_traffic.policies.rules.seeing import (
+    LISTED,
     QUEUE_GAP,
     alone,
+    enlist,
     gather,
     look_ahead,
     meets_nobody,
+    unlist_cars,
     wanted_gap,
     way_to_go,
 )
