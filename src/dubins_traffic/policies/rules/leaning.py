@@ -6,12 +6,12 @@ the middle of its lane and one that stands at the centre line, yet the lane is f
 
 from __future__ import annotations
 
-from math import sqrt
-
 from dubins_traffic.cars.state import EGO
 from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
 from dubins_traffic.policies.rules.seeing import (
+    Beside,
+    farthest_right,
     is_by_disc_behind,
     kept_beside,
     leans,
@@ -111,14 +111,10 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
             if leans(vehicle):
                 edge = min(edge, vehicle.middle - vehicle.over)
             offset = min(offset, edge - clear)
-        elif one_is_ego(j, n) and leans_past(b, n, j, left, px, py, traffic.drivers.car[b, n], traffic):
+        elif one_is_ego(j, n) and leans_past(b, n, j, Beside(left, px, py), way, traffic):
             if left >= 0.0:
                 offset = min(offset, left - half - clear)
             elif part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:
                 offset = left + half + clear
-    most = EDGE - vehicle.middle
-    if part == PART.THROUGH and way.side < 0.0 and way.radius > vehicle.middle:
-        # The road's inner corner is nearer than its edge.
-        half = sqrt(0.5 + 0.5 * (way.ux * way.tx + way.uy * way.ty))
-        most = max(most, (way.radius - vehicle.middle) / half - way.radius + EDGE)
+    most = farthest_right(way, state.x[b, n], state.y[b, n]) if part == PART.THROUGH else EDGE - vehicle.middle
     return max(offset, most)

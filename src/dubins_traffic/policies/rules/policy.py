@@ -28,7 +28,7 @@ from dubins_traffic.policies.rules.command_cache import (
 )
 from dubins_traffic.policies.rules.exits import count_visit, take_lane, ticks_of, watch_ego
 from dubins_traffic.policies.rules.leaning import lean
-from dubins_traffic.policies.rules.narrow import within_lane
+from dubins_traffic.policies.rules.narrow import EDGE, within_lane
 from dubins_traffic.policies.rules.passing import PASSING_WAIT, find_way_past, keep_off
 from dubins_traffic.policies.rules.returning import keep_passing
 from dubins_traffic.policies.rules.right_of_way import before_ego, kept_out_for_long, yield_at_line
@@ -155,7 +155,8 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         part, key, left, px, py = on_lane(way, x, y)
     leaves = car.kind != KIND.ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], car.lane)
     chooses = leaves and drivers.way[b, n].crossing != 0
-    free = company < COMPANY.CROWDED and just_drives(car)
+    beyond = left < EDGE - vehicle.middle  # it has leaned to the outside of a bend, and must not leave the road there
+    free = company < COMPANY.CROWDED and just_drives(car) and not beyond
     free = free and (not chooses or keeps_exit(b, n, tick, drivers.way[b, n], traffic))
     if free and company != COMPANY.ALONE:
         free = meets_nobody(b, n, part, key, left, x, y, way, state, vehicle)
@@ -178,14 +179,14 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
     if leaves:
         find_way_out(b, n, tick, part, traffic)
     bend = way.bend if part == PART.THROUGH else 0.0
-    if not close and follows_line(b, n, left - offset, traffic):
+    if not (close or beyond) and follows_line(b, n, left - offset, traffic):
         follow_line(b, n, speed, left - offset, px, py, bend, traffic, commands)
         return
     listed, trusted = near if close else 0, who if rides else -1
     speed, yaw_rate = move(
         b, n, speed, left, offset, px, py, bend, outside, way, listed, trusted, traffic
     )  # fmt: skip
-    checked = (car.kind == KIND.ROUND or offset < 0.0 or speed < 0.0) and company != COMPANY.UNROLLED
+    checked = (car.kind == KIND.ROUND or offset < 0.0 or speed < 0.0 or beyond) and company != COMPANY.UNROLLED
     if speed != 0.0 and checked and strays(b, n, speed, yaw_rate, way, traffic):
         speed = 0.0
     commands[b, n, 0] = speed

@@ -53,6 +53,14 @@ AWARE = 0.06
 """A car takes note of bodies up to this much farther away than the gap it keeps, metres."""
 
 
+class Beside(NamedTuple):
+    """Where a body is beside a way: left of its middle, m, and the direction of the way there."""
+
+    left: float
+    px: float
+    py: float
+
+
 @jit_inline
 def way_to_go(way: ReferencePath, x: float, y: float) -> float:
     """Return the coordinate of a point along the lane from the intersection at its end, metres, negative before it."""
@@ -173,7 +181,7 @@ def look_ahead(
         if left > ASTRAY and its_left > wide and comes_past(way, x, y, dx, dy, wide):
             continue
         beside = one_is_ego(j, n) or its_left > vehicle.middle
-        if beside and leans_past(b, n, j, its_left, px, py, car, traffic):
+        if beside and leans_past(b, n, j, Beside(its_left, px, py), way, traffic):
             continue
         passed = car.aside > 0.0 and labels.bits[b, j] & FLAG.STANDS != 0
         if passed and its_left < car.aside - wide + SIDE:
@@ -209,22 +217,22 @@ def comes_past(way: ReferencePath, x: float, y: float, dx: float, dy: float, wid
 
 
 @jit_rare
-def leans_past(b: int, n: int, j: int, left: float, px: float, py: float, car: Driver, traffic: Traffic) -> bool:
-    """Tell whether car `n` gets past car `j` in a disc, `left` (m) of the middle of its way, by leaning, as it will.
+def leans_past(b: int, n: int, j: int, place: Beside, way: ReferencePath, traffic: Traffic) -> bool:
+    """Tell whether car `n` gets past car `j` in a disc, at a `place` (m, direction) beside its way, by leaning.
 
-    The way has the direction (`px`, `py`) there. Two e-agents do so in bends and dead ends, where a tick is long.
+    Two e-agents do so in bends and dead ends, where a tick is long.
     """
-    vehicle = traffic.drivers.vehicle[b]
-    if car.aside != 0.0 or traffic.labels.lane[b, j] >= 0:
+    state, vehicle, left = traffic.state, traffic.drivers.vehicle[b], place.left
+    if traffic.drivers.car[b, n].aside != 0.0 or traffic.labels.lane[b, j] >= 0:
         return False
     if not one_is_ego(j, n):
         first, disc = int(traffic.roads.vert_off[traffic.drivers.net[b]]), int(traffic.labels.crosses[b, j])
         if not leans(vehicle) or disc < 0 or int(traffic.roads.degree[first + disc]) >= vehicle.degree:
             return False
-    kept = half_across(b, j, px, py, traffic.state, vehicle) + kept_beside(vehicle)
+    kept = half_across(b, j, place.px, place.py, state, vehicle) + kept_beside(vehicle)
     if left < 0.0:
         return left + kept <= farthest_left(vehicle)
-    return left - kept >= EDGE - vehicle.middle
+    return left - kept >= farthest_right(way, state.x[b, j], state.y[b, j])
 
 
 @jit_inline
@@ -237,6 +245,28 @@ def one_is_ego(j: int, n: int) -> bool:
 def farthest_left(vehicle: Vehicle) -> float:
     """Return how far left of its lane's middle a car drives at most, metres: its body hardly comes over the line."""
     return vehicle.middle - vehicle.half_width - vehicle.rounding + vehicle.over
+
+
+@jit_rare
+def farthest_right(way: ReferencePath, x: float, y: float) -> float:
+    """Return the offset from its way, negative, at which a car beside a point, `x` (m), `y` (m), is at the road's edge.
+
+    Outside a turn to the left the road reaches farther, round the corner; the inner corner of one to the right is
+    nearer than the edge.
+    """
+    most = EDGE - way.middle
+    part, _, _, px, py = on_way(way, x, y)
+    if part != PART.THROUGH:
+        return most
+    if way.side < 0.0:
+        half = sqrt(0.5 + 0.5 * (way.ux * way.tx + way.uy * way.ty))
+        inner = (way.radius - way.middle) / half - way.radius + EDGE
+        return max(most, inner) if way.radius > way.middle else most
+    # The road's end is a disc about the intersection: from the centre of the arc it reaches so far in this direction.
+    rx, ry = way.x - way.cx, way.y - way.cy
+    along, across = py * rx - px * ry, px * rx + py * ry
+    half2 = 4.0 * way.middle * way.middle - across * across
+    return min(most, way.radius - along - sqrt(half2) + EDGE) if half2 > 0.0 else most
 
 
 @jit_inline
