@@ -21,41 +21,6 @@ from dubins_traffic.routing.lane_graph import (
     spread,
 )
 
-
-@jit
-def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick: int) -> int:
-    """Return a random lane out of `v`, each equally likely, except the one back, which is taken at dead ends only.
-
-    The draw follows from the team's seed, `car` (number) and tick.
-    """
-    arms, degree = roads.arms, roads.degree
-    if degree[v] < 2:
-        return lane ^ 1
-    pick = below(team.seed, team.trial, car, tick, DRAW.LANE, degree[v] - 1)
-    for k in range(degree[v]):
-        if arms[v, k] != lane ^ 1:
-            if pick == 0:
-                return arms[v, k]
-            pick -= 1
-    return lane ^ 1
-
-
-@jit
-def nearer_exit(roads: RoadTable, v: int, lane: int, hops: Ints) -> int:
-    """Return the lane out of `v` with the fewest hops to go; the lane back only if no other leads there.
-
-    `hops` (L,) is the number of lanes to go from each lane.
-    """
-    arms, degree = roads.arms, roads.degree
-    best = lane ^ 1
-    fewest = FAR
-    for k in range(degree[v]):
-        if arms[v, k] != lane ^ 1 and hops[arms[v, k]] < fewest:
-            best = arms[v, k]
-            fewest = hops[best]
-    return best
-
-
 AIM = 0.6
 """Distance to the waypoint of a car that can't turn in place, metres (for w = 0.3 m); at least twice its radius."""
 BEND_AIM = 0.3
@@ -214,3 +179,37 @@ def choose(b: int, n: int, tick: int, lane: int, seen: bool, scene: Scene) -> in
     taken = nearer_exit(roads, v, lane, hops)
     agent.place = place_of(taken, first, last, cycle)
     return taken
+
+
+@jit
+def random_exit(roads: RoadTable, v: int, lane: int, team: Team, car: int, tick: int) -> int:
+    """Return a random lane out of `v`, each equally likely, except the one back, which is taken at dead ends only.
+
+    The draw follows from the team's seed, `car` (number) and tick.
+    """
+    arms, degree = roads.arms, roads.degree
+    if degree[v] < 2:
+        return lane ^ 1
+    pick = below(team.seed, team.trial, car, tick, DRAW.LANE, degree[v] - 1)
+    for k in range(degree[v]):
+        if arms[v, k] != lane ^ 1:
+            if pick == 0:
+                return arms[v, k]
+            pick -= 1
+    return lane ^ 1
+
+
+@jit
+def nearer_exit(roads: RoadTable, v: int, lane: int, hops: Ints) -> int:
+    """Return the lane out of `v` with the fewest hops to go; the lane back only if no other leads there.
+
+    `hops` (L,) is the number of lanes to go from each lane.
+    """
+    arms, degree = roads.arms, roads.degree
+    best = lane ^ 1
+    fewest = FAR
+    for k in range(degree[v]):
+        if arms[v, k] != lane ^ 1 and hops[arms[v, k]] < fewest:
+            best = arms[v, k]
+            fewest = hops[best]
+    return best

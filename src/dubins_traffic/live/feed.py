@@ -26,37 +26,6 @@ from dubins_traffic.viewer.marks import (
 )
 from dubins_traffic.viewer.replay import document_of, mark_of, origin_of, shown_summary
 
-NEAR: Final = 1.5
-"""Metres before the line from which a driver is told of a crossing."""
-
-
-@dataclass(frozen=True, slots=True)
-class Turn:
-    """What the ego has to do at the crossing ahead, in a word (free, stop, wait, go) and in a sentence."""
-
-    state: str
-    text: str
-
-
-FREE: Final = Turn("free", "")
-"""Nothing: there is no crossing near."""
-
-
-def turn_of(propositions: Propositions, here: Situation) -> Turn:
-    """Return whose turn it is (docs/rules.md#queue), as far as the ego can see."""
-    if here.stop_line <= 0.0 or not here.crossing or here.stop_line > NEAR:
-        return FREE
-    if not propositions.stopped:
-        return Turn("stop", "Stop at the line before the crossing")
-    if propositions.ahead:
-        names = ", ".join(car.name for car in here.before) or "another car"
-        return Turn("wait", f"Wait: {names} before you")
-    if not propositions.clear:
-        names = ", ".join(car.name for car in here.inside) or "another car"
-        return Turn("wait", f"Wait: {names} in the crossing")
-    return Turn("go", "Your turn: go")
-
-
 FALLEN_BEHIND: Final = 0.5
 """Seconds by which a trial may be late before the time that was lost is given up."""
 
@@ -208,3 +177,34 @@ def _block(rate: float, state: State, labels: Labels) -> Frames:
     """Return frame 0 as a block, which shares the arrays."""
     asked = [np.zeros_like(state.x)] * 2
     return Frames(0, rate, *state[:6], *asked, *labels)
+
+
+NEAR: Final = 1.5
+"""Metres before the line from which a driver is told of a crossing."""
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """What the ego has to do at the crossing ahead, in a word (free, stop, wait, go) and in a sentence."""
+
+    state: str
+    text: str
+
+
+FREE: Final = Turn("free", "")
+"""Nothing: there is no crossing near."""
+
+
+def turn_of(propositions: Propositions, here: Situation) -> Turn:
+    """Return whose turn it is (docs/rules.md#queue), as far as the ego can see."""
+    if here.stop_line <= 0.0 or not here.crossing or here.stop_line > NEAR:
+        return FREE
+    if not propositions.stopped:
+        return Turn("stop", "Stop at the line before the crossing")
+    if propositions.ahead:
+        names = ", ".join(car.name for car in here.before) or "another car"
+        return Turn("wait", f"Wait: {names} before you")
+    if not propositions.clear:
+        names = ", ".join(car.name for car in here.inside) or "another car"
+        return Turn("wait", f"Wait: {names} in the crossing")
+    return Turn("go", "Your turn: go")

@@ -34,56 +34,6 @@ from dubins_traffic.scoring.metric import Column
 from dubins_traffic.scoring.verdict import ASSUMPTIONS, EGO_RULES, told_cut
 from dubins_traffic.viewer.pages import PAGES, render
 
-SPECIAL = {character: f"\\{character}" for character in "&%$#_{}"} | {
-    "\\": r"\textbackslash{}",
-    "~": r"\textasciitilde{}",
-    "^": r"\textasciicircum{}",
-    "<": r"\textless{}",
-    ">": r"\textgreater{}",
-}
-
-
-def latex_table(comparison: Comparison) -> str:
-    r"""Return the controllers, the best first, in the metrics of the terminal's table, with 95 % intervals.
-
-    A document that puts it in by ``\input{table}`` needs ``\usepackage{booktabs}``.
-    """
-    metrics = short_metrics(comparison)
-    title = escaped(comparison.campaign.model.name)
-    lines = [
-        f"% {title}: {comparison.trials} of {comparison.total} trials; means, with 95 % intervals. Needs booktabs.",
-        rf"\begin{{tabular}}{{l{'r' * len(metrics)}}}",
-        r"\toprule",
-        _row("controller", *(escaped(metric.heading) for metric in metrics)),
-        r"\midrule",
-        *(_row(_name(standing), *(_cell(standing, metric) for metric in metrics)) for standing in comparison.standings),
-        r"\bottomrule",
-        r"\end{tabular}",
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def escaped(text: str) -> str:
-    """Return a text as LaTeX prints it, in one line."""
-    return re.sub(r".", lambda match: SPECIAL.get(match[0], match[0]), " ".join(text.split()))
-
-
-def _name(standing: Standing) -> str:
-    return rf"\texttt{{{escaped(standing.controller)}}}"
-
-
-def _row(*cells: str) -> str:
-    return f"{' & '.join(cells)} \\\\"
-
-
-def _cell(standing: Standing, metric: Column) -> str:
-    mean, ends = short_estimate(standing, metric)
-    if mean is None or ends is None:
-        return "--"
-    low, high = map(shown, ends)
-    return f"${shown(mean)}$ [${low}$, ${high}$]"
-
-
 MINUS = "\N{MINUS SIGN}"
 
 
@@ -421,3 +371,53 @@ def _csv_text(headings: Sequence[str], rows: Iterator[Sequence[object]]) -> str:
     writer.writerow(headings)
     writer.writerows(["" if cell is None else cell for cell in row] for row in rows)
     return stream.getvalue()
+
+
+SPECIAL = {character: f"\\{character}" for character in "&%$#_{}"} | {
+    "\\": r"\textbackslash{}",
+    "~": r"\textasciitilde{}",
+    "^": r"\textasciicircum{}",
+    "<": r"\textless{}",
+    ">": r"\textgreater{}",
+}
+
+
+def latex_table(comparison: Comparison) -> str:
+    r"""Return the controllers, the best first, in the metrics of the terminal's table, with 95 % intervals.
+
+    A document that puts it in by ``\input{table}`` needs ``\usepackage{booktabs}``.
+    """
+    metrics = short_metrics(comparison)
+    title = escaped(comparison.campaign.model.name)
+    lines = [
+        f"% {title}: {comparison.trials} of {comparison.total} trials; means, with 95 % intervals. Needs booktabs.",
+        rf"\begin{{tabular}}{{l{'r' * len(metrics)}}}",
+        r"\toprule",
+        _row("controller", *(escaped(metric.heading) for metric in metrics)),
+        r"\midrule",
+        *(_row(_name(standing), *(_cell(standing, metric) for metric in metrics)) for standing in comparison.standings),
+        r"\bottomrule",
+        r"\end{tabular}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def escaped(text: str) -> str:
+    """Return a text as LaTeX prints it, in one line."""
+    return re.sub(r".", lambda match: SPECIAL.get(match[0], match[0]), " ".join(text.split()))
+
+
+def _name(standing: Standing) -> str:
+    return rf"\texttt{{{escaped(standing.controller)}}}"
+
+
+def _row(*cells: str) -> str:
+    return f"{' & '.join(cells)} \\\\"
+
+
+def _cell(standing: Standing, metric: Column) -> str:
+    mean, ends = short_estimate(standing, metric)
+    if mean is None or ends is None:
+        return "--"
+    low, high = map(shown, ends)
+    return f"${shown(mean)}$ [${low}$, ${high}$]"

@@ -34,55 +34,6 @@ from dubins_traffic.roads.lookup import CERTAIN, lane_end
 from dubins_traffic.roads.table import RoadTable
 from dubins_traffic.rules.propositions import FLAG
 
-
-@jit_inline
-def way_of(b: int, n: int, roads: RoadTable, drivers: Drivers) -> ReferencePath:
-    """Return the way of car n from its lane to the next one, from the cache if that is valid."""
-    car = drivers.car[b, n]
-    row = drivers.way[b, n]
-    if not _is_of(car.lane, car.next_lane, row):
-        keep_way(b, n, roads, drivers)
-    return kept_way(row)
-
-
-@jit_look
-def _is_of(lane: int, out: int, row: KeptPath) -> bool:
-    """Tell whether the cached way leads from `lane` to lane `out`."""
-    return row.lane == lane and row.out == out
-
-
-@jit_inline
-def kept_way(row: KeptPath) -> ReferencePath:
-    """Return the way that a row of `Drivers.way` holds."""
-    return ReferencePath(
-        row.x, row.y, row.tx, row.ty, row.ux, row.uy, row.cx, row.cy, row.radius, row.side, row.middle, row.bend
-    )  # fmt: skip
-
-
-@jit
-def keep_way(b: int, n: int, roads: RoadTable, drivers: Drivers) -> None:
-    """Compute the way of car n from its lane to the next one and store it in the cache."""
-    net = drivers.net[b]
-    vehicle = drivers.vehicle[b]
-    car = drivers.car[b, n]
-    row = drivers.way[b, n]
-    way = way_between(roads, net, car.lane, car.next_lane, vehicle.middle, vehicle.disc)
-    row.lane = car.lane
-    row.out = car.next_lane
-    degree = roads.degree[roads.vert_off[net] + lane_end(roads, net, car.lane)]
-    row.crossing = 1 if degree >= vehicle.degree else 0
-    row.length = roads.segment[int(roads.seg_off[net]) + (car.lane >> 1)].length
-    row.out_length = roads.segment[int(roads.seg_off[net]) + (car.next_lane >> 1)].length
-    mouth, _ = queue_lengths(vehicle)
-    row.roomy = 1 if row.out_length - mouth - mouth >= 0.0 else 0
-    row.x, row.y = way.x, way.y
-    row.tx, row.ty = way.tx, way.ty
-    row.ux, row.uy = way.ux, way.uy
-    row.cx, row.cy = way.cx, way.cy
-    row.radius, row.side = way.radius, way.side
-    row.middle, row.bend = way.middle, way.bend
-
-
 IF_NOT_BEHIND_EGO = 2.0
 """Value of `KeptCommands.holds`: the cached command is valid if the ego is not ahead in the car's lane."""
 
@@ -322,3 +273,51 @@ def keeps_to_road(b: int, n: int, x: float, y: float, way: ReferencePath, roads:
     before = 0.0 < to_go < row.length and abs(way.tx * ry - way.ty * rx) < room
     behind = 0.0 < since < row.out_length and abs(way.ux * ry - way.uy * rx) < room
     return before or behind or rx * rx + ry * ry < room * room
+
+
+@jit_inline
+def way_of(b: int, n: int, roads: RoadTable, drivers: Drivers) -> ReferencePath:
+    """Return the way of car n from its lane to the next one, from the cache if that is valid."""
+    car = drivers.car[b, n]
+    row = drivers.way[b, n]
+    if not _is_of(car.lane, car.next_lane, row):
+        keep_way(b, n, roads, drivers)
+    return kept_way(row)
+
+
+@jit_look
+def _is_of(lane: int, out: int, row: KeptPath) -> bool:
+    """Tell whether the cached way leads from `lane` to lane `out`."""
+    return row.lane == lane and row.out == out
+
+
+@jit_inline
+def kept_way(row: KeptPath) -> ReferencePath:
+    """Return the way that a row of `Drivers.way` holds."""
+    return ReferencePath(
+        row.x, row.y, row.tx, row.ty, row.ux, row.uy, row.cx, row.cy, row.radius, row.side, row.middle, row.bend
+    )  # fmt: skip
+
+
+@jit
+def keep_way(b: int, n: int, roads: RoadTable, drivers: Drivers) -> None:
+    """Compute the way of car n from its lane to the next one and store it in the cache."""
+    net = drivers.net[b]
+    vehicle = drivers.vehicle[b]
+    car = drivers.car[b, n]
+    row = drivers.way[b, n]
+    way = way_between(roads, net, car.lane, car.next_lane, vehicle.middle, vehicle.disc)
+    row.lane = car.lane
+    row.out = car.next_lane
+    degree = roads.degree[roads.vert_off[net] + lane_end(roads, net, car.lane)]
+    row.crossing = 1 if degree >= vehicle.degree else 0
+    row.length = roads.segment[int(roads.seg_off[net]) + (car.lane >> 1)].length
+    row.out_length = roads.segment[int(roads.seg_off[net]) + (car.next_lane >> 1)].length
+    mouth, _ = queue_lengths(vehicle)
+    row.roomy = 1 if row.out_length - mouth - mouth >= 0.0 else 0
+    row.x, row.y = way.x, way.y
+    row.tx, row.ty = way.tx, way.ty
+    row.ux, row.uy = way.ux, way.uy
+    row.cx, row.cy = way.cx, way.cy
+    row.radius, row.side = way.radius, way.side
+    row.middle, row.bend = way.middle, way.bend
