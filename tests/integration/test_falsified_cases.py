@@ -33,8 +33,8 @@ def test_rules_gets_past_who_stands_askew_beside_it() -> None:
     open to it, or turned to its line and back for ever; or who stood there owed no exit, since it came in later.
 
     Or who stood before an obstacle just out of a bend was excused by the ego that waited in the bend behind it; or it
-    did not fall back behind who had moved up beside it, to a bend or into a dead end, or stood before a bend off the
-    middle of its lane, right of the centre line, where it could have driven on.
+    did not fall back behind who had moved up beside it, to a bend or into a dead end, or too flat to get away from it,
+    or stood before a bend off the middle of its lane, right of the centre line, where it could have driven on.
     """
     assert [own.file.name for own in outcomes(cases_in(CONTRACT / "blocked"), "rules") if not own.passed] == []
 

@@ -204,15 +204,20 @@ def fall_back(b: int, n: int, here: float, line: Line, way: ReferencePath, near:
     if clear == 0.0:
         return Motion(0.0, 0.0, False)
     gear = -1.0 if vehicle.slowest < 0.0 else 1.0
-    # Not yet clear it goes to the left as steeply as it may: less steeply it might come nearer to who is behind it.
+    # Not yet clear it goes to the left as steeply as it may: less steeply it might come nearer to who is behind it. If
+    # it still would, it turns until it goes more steeply.
     away = 1.0 if clear > line.left else clear - line.left
-    speed, yaw_rate = steer(
-        gear * state.c[b, n], gear * state.s[b, n], away, -line.px, -line.py, 0.0, SLIDES, SLANT, ALIGNED,
-        vehicle.yaw_most, 0.0, vehicle.period,
-    )  # fmt: skip
-    speed = max(gear * speed, vehicle.slowest)
     traffic.drivers.car[b, n].until = -INFINITE
-    return Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
+    motion = Motion(0.0, 0.0, False)
+    for most, aligned in ((SLANT, ALIGNED), (STEEP, EXACT)):
+        speed, yaw_rate = steer(
+            gear * state.c[b, n], gear * state.s[b, n], away, -line.px, -line.py, 0.0, SLIDES, most, aligned,
+            vehicle.yaw_most, 0.0, vehicle.period,
+        )  # fmt: skip
+        speed = max(gear * speed, vehicle.slowest)
+        if not motion.safe:
+            motion = Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
+    return motion
 
 
 @jit_inline
