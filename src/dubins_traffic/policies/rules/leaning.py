@@ -116,5 +116,5 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
                 offset = min(offset, left - half - clear)
             elif part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:
                 offset = left + half + clear
-    most = farthest_right(way, state.x[b, n], state.y[b, n]) if part == PART.THROUGH else EDGE - vehicle.middle
+    most = farthest_right(way, state.x[b, n], state.y[b, n], vehicle) if part == PART.THROUGH else EDGE - vehicle.middle
     return max(offset, most)

@@ -155,7 +155,8 @@ def drive(b: int, n: int, tick: int, company: int, sight2: float, traffic: Traff
         part, key, left, px, py = on_lane(way, x, y)
     leaves = car.kind != KIND.ROUND and labels.crosses[b, n] == lane_end(roads, drivers.net[b], car.lane)
     chooses = leaves and drivers.way[b, n].crossing != 0
-    beyond = left < EDGE - vehicle.middle  # it has leaned to the outside of a bend, and must not leave the road there
+    # It has leaned to the outside of a bend, and must not leave the road there.
+    beyond = left < EDGE - vehicle.middle and vehicle.tightest == 0.0
     free = company < COMPANY.CROWDED and just_drives(car) and not beyond
     free = free and (not chooses or keeps_exit(b, n, tick, drivers.way[b, n], traffic))
     if free and company != COMPANY.ALONE:

@@ -232,7 +232,7 @@ def leans_past(b: int, n: int, j: int, place: Beside, way: ReferencePath, traffi
     kept = half_across(b, j, place.px, place.py, state, vehicle) + kept_beside(vehicle)
     if left < 0.0:
         return left + kept <= farthest_left(vehicle)
-    return left - kept >= farthest_right(way, state.x[b, j], state.y[b, j])
+    return left - kept >= farthest_right(way, state.x[b, j], state.y[b, j], vehicle)
 
 
 @jit_inline
@@ -248,15 +248,15 @@ def farthest_left(vehicle: Vehicle) -> float:
 
 
 @jit_rare
-def farthest_right(way: ReferencePath, x: float, y: float) -> float:
+def farthest_right(way: ReferencePath, x: float, y: float, vehicle: Vehicle) -> float:
     """Return the offset from its way, negative, at which a car beside a point, `x` (m), `y` (m), is at the road's edge.
 
-    Outside a turn to the left the road reaches farther, round the corner; the inner corner of one to the right is
-    nearer than the edge.
+    Outside a turn to the left the road reaches farther, round the corner, for who turns in place; the inner corner of
+    one to the right is nearer than the edge.
     """
     most = EDGE - way.middle
     part, _, _, px, py = on_way(way, x, y)
-    if part != PART.THROUGH:
+    if part != PART.THROUGH or (way.side > 0.0 and vehicle.tightest > 0.0):
         return most
     if way.side < 0.0:
         half = sqrt(0.5 + 0.5 * (way.ux * way.tx + way.uy * way.ty))
