@@ -13,6 +13,7 @@ from dubins_traffic.policies.rules.seeing import (
     Beside,
     farthest_right,
     is_by_disc_behind,
+    is_in_bend,
     kept_beside,
     leans,
     leans_from,
@@ -69,7 +70,7 @@ def may_lean(b: int, n: int, way: ReferencePath, traffic: Traffic) -> bool:
     vehicle, net = drivers.vehicle[b], drivers.net[b]
     first = int(roads.vert_off[net])
     disc, lane = int(labels.crosses[b, n]), int(labels.lane[b, n])
-    if disc >= 0 and int(roads.degree[first + disc]) < vehicle.degree:
+    if is_in_bend(b, n, traffic):
         return True
     if lane < 0:
         beside = int(labels.lane[b, EGO]) ^ 1
@@ -116,5 +117,7 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
                 offset = min(offset, left - half - clear)
             elif part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:
                 offset = left + half + clear
-    most = farthest_right(way, state.x[b, n], state.y[b, n], vehicle) if part == PART.THROUGH else EDGE - vehicle.middle
-    return max(offset, most)
+    if part != PART.THROUGH:
+        return max(offset, EDGE - vehicle.middle)
+    around = vehicle.tightest == 0.0 and is_in_bend(b, n, traffic)
+    return max(offset, farthest_right(way, state.x[b, n], state.y[b, n], around))

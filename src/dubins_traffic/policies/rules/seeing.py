@@ -225,14 +225,13 @@ def leans_past(b: int, n: int, j: int, place: Beside, way: ReferencePath, traffi
     state, vehicle, left = traffic.state, traffic.drivers.vehicle[b], place.left
     if traffic.drivers.car[b, n].aside != 0.0 or traffic.labels.lane[b, j] >= 0:
         return False
-    if not one_is_ego(j, n):
-        first, disc = int(traffic.roads.vert_off[traffic.drivers.net[b]]), int(traffic.labels.crosses[b, j])
-        if not leans(vehicle) or disc < 0 or int(traffic.roads.degree[first + disc]) >= vehicle.degree:
-            return False
+    bend = is_in_bend(b, j, traffic)
+    if not (one_is_ego(j, n) or (bend and leans(vehicle))):
+        return False
     kept = half_across(b, j, place.px, place.py, state, vehicle) + kept_beside(vehicle)
     if left < 0.0:
         return left + kept <= farthest_left(vehicle)
-    return left - kept >= farthest_right(way, state.x[b, j], state.y[b, j], vehicle)
+    return left - kept >= farthest_right(way, state.x[b, j], state.y[b, j], bend and vehicle.tightest == 0.0)
 
 
 @jit_inline
@@ -247,16 +246,23 @@ def farthest_left(vehicle: Vehicle) -> float:
     return vehicle.middle - vehicle.half_width - vehicle.rounding + vehicle.over
 
 
+@jit_inline
+def is_in_bend(b: int, n: int, traffic: Traffic) -> bool:
+    """Tell whether a car's body meets the disc of a bend or dead end."""
+    first, disc = int(traffic.roads.vert_off[traffic.drivers.net[b]]), int(traffic.labels.crosses[b, n])
+    return disc >= 0 and int(traffic.roads.degree[first + disc]) < traffic.drivers.vehicle[b].degree
+
+
 @jit_rare
-def farthest_right(way: ReferencePath, x: float, y: float, vehicle: Vehicle) -> float:
+def farthest_right(way: ReferencePath, x: float, y: float, around: bool) -> float:
     """Return the offset from its way, negative, at which a car beside a point, `x` (m), `y` (m), is at the road's edge.
 
-    Outside a turn to the left the road reaches farther, round the corner, for who turns in place; the inner corner of
-    one to the right is nearer than the edge.
+    Outside a turn to the left the road reaches farther, if `around`: in bends, for who turns in place. The inner corner
+    of one to the right is nearer than the edge.
     """
     most = EDGE - way.middle
     part, _, _, px, py = on_way(way, x, y)
-    if part != PART.THROUGH or (way.side > 0.0 and vehicle.tightest > 0.0):
+    if part != PART.THROUGH or (way.side > 0.0 and not around):
         return most
     if way.side < 0.0:
         half = sqrt(0.5 + 0.5 * (way.ux * way.tx + way.uy * way.ty))
