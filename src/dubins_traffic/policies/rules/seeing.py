@@ -257,8 +257,8 @@ def is_in_bend(b: int, n: int, traffic: Traffic) -> bool:
 def farthest_right(way: ReferencePath, x: float, y: float, around: bool) -> float:
     """Return the offset from its way, negative, at which a car beside a point, `x` (m), `y` (m), is at the road's edge.
 
-    Outside a turn to the left the road reaches farther, if `around`: in bends, for who turns in place. The inner corner
-    of one to the right is nearer than the edge.
+    Outside a turn to the left the road reaches farther, if `around` (bool): in bends, for who turns in place. The inner
+    corner of one to the right is nearer than the edge.
     """
     most = EDGE - way.middle
     part, _, _, px, py = on_way(way, x, y)
