@@ -71,20 +71,20 @@ def decide_in(b: int, tick: int, radius: float, state: State, known: Knowledge, 
 @jit
 def _watch(known: Knowledge) -> bool:
     """Count how long each sensed car has stood; return whether there is any."""
-    standing = False
+    sensed = False
     ego, manner = known.follower, known.manner
     for n in range(known.other.shape[0]):
         car = known.other[n]
         if car.tick != ego.tick:
             known.still[n] = 0.0
             continue
-        standing = True
+        sensed = True
         known.gap[n] = gap_from(known, ego.x, ego.y, n)
         if abs(car.speed) > manner.moves or abs(car.yaw_rate) > manner.turns:
             known.still[n] = 0.0
         else:
             known.still[n] += known.vehicle.period
-    return standing
+    return sensed
 
 
 @jit

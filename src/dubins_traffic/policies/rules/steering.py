@@ -85,8 +85,8 @@ def move(
         speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
     safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     # A car that turns in place to where it may not drive would turn back in the next tick, and so on for ever.
-    strays = offset < 0.0 or abs(left) > SLIGHT
-    if safe and speed == 0.0 and vehicle.tightest == 0.0 and (passes or steep == ABRUPT or strays):
+    off_line = offset < 0.0 or abs(left) > SLIGHT
+    if safe and speed == 0.0 and vehicle.tightest == 0.0 and (passes or steep == ABRUPT or off_line):
         safe = leads_on(b, n, Line(left - offset, px, py, allowed), steep, near, trusted, traffic)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
     if returns and (near > 0 or allowed < CREEPS) and vehicle.tightest == 0.0:
@@ -215,8 +215,9 @@ def fall_back(b: int, n: int, here: float, line: Line, way: ReferencePath, near:
             vehicle.yaw_most, 0.0, vehicle.period,
         )  # fmt: skip
         speed = max(gear * speed, vehicle.slowest)
-        if not motion.safe:
-            motion = Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
+        motion = Motion(speed, yaw_rate, is_safe(b, n, speed, yaw_rate, near, -1, traffic, vehicle))
+        if motion.safe:
+            break
     return motion
 
 
