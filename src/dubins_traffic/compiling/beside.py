@@ -240,7 +240,7 @@ class Builder(subprocess.Popen[bytes]):
             os.write(self._mouth, wish.line())
 
     def hang_up(self) -> None:
-        """Tell it nothing more."""
+        """Close the pipe to the compiling process, which then gets no more requests."""
         os.close(self._mouth)
 
     def __del__(self) -> None:

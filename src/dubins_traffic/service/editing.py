@@ -44,7 +44,7 @@ class Change(NamedTuple):
 
     @property
     def same(self) -> bool:
-        """Whether nothing changes; dates are told to the second, and so are they compared."""
+        """Whether the edit changes nothing; dates are shown to the second, so they are compared to the second."""
         if self.date and self.before is not None and self.after is not None:
             return seconds(self.before) == seconds(self.after)
         return self.before == self.after

@@ -76,7 +76,10 @@ def take(session: Session, worker: str, at: float, seconds: float, unjudged: Seq
 
 
 def arrive(session: Session, team_id: int, at: float) -> None:
-    """Let a team that had nothing in the queue begin with as much as who has had the least of those who have."""
+    """Let a team without work in the queue begin level with the waiting team that has been served least.
+
+    So a team gains no turns by staying away. `at` is the time, seconds since 1970.
+    """
     charged = _charged(session, at)
     if team_id not in charged:
         most = session.scalar(select(func.max(Team.turn))) or 0.0

@@ -55,7 +55,7 @@ class Sessions(ServerSideSessionBackend):
     """
 
     def get_session_id(self, connection: ASGIConnection[Any, Any, Any, Any]) -> str:  # noqa: ARG002
-        """Return a new id; that of the request's cookie serves to find a session alone."""
+        """Return a new id for a session that is written; the id in the request's cookie only finds one."""
         return self.generate_session_id()
 
     async def load_from_connection(self, connection: ASGIConnection[Any, Any, Any, Any]) -> dict[str, Any]:

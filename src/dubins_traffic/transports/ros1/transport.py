@@ -287,7 +287,7 @@ class Ros1:
             self._services.close(forget=not self._lost)
 
     def look(self) -> None:
-        """Tell the mailbox who has come and gone, also of who came, spoke and went between two looks."""
+        """Tell the mailbox which drivers have come and gone, those that came, spoke and went between two looks too."""
         with self._looking:
             for car, subscriber in self._subscribers.items():
                 before, was_heard = self._there.get(car, 0), car in self._spoke
