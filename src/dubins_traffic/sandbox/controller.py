@@ -94,7 +94,7 @@ class BoxedController:
         return Command(answer.speed, answer.yaw_rate)
 
     def _note(self, box: Box, reports: tuple[tuple[str, str], ...]) -> None:
-        """Keep the reports of a decision; those of a trial are limited as printed output is, since records hold them."""
+        """Keep the reports of a decision; those of a trial are limited like printed output, since records hold them."""
         self._reports = reports
         self._reported += sum(len(kind) + len(detail) for kind, detail in reports)
         if self._reported > self._limits.output:

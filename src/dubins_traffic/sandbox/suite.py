@@ -96,7 +96,7 @@ class Baits:
         return server
 
     def document(self) -> dict[str, Any]:
-        """Return what an attack is told of this machine: a secret, files, a port, a process and more that it must not reach."""
+        """Return what an attack is told of this machine and must not reach: a secret, files, a port, processes."""
         return {
             "secret": self.secret,
             "file": str(self.file),

@@ -124,7 +124,7 @@ class Graph:
         return bool(listed(writer.get_matched_subscriptions))
 
     def writers(self, reader: Any) -> int:
-        """Count the programs that write the topic of a reader.
+        """Count the writers on the topic of a reader that are still there.
 
         DDS misses a process that was killed after 10 or 20 seconds; if it was on this machine, its socket is gone.
         """
