@@ -11,6 +11,7 @@ from dubins_traffic.kernels.compile import jit_inline, jit_rare
 from dubins_traffic.policies.rules.narrow import EDGE
 from dubins_traffic.policies.rules.seeing import (
     Beside,
+    farthest_left,
     farthest_right,
     is_by_disc_behind,
     is_in_bend,
@@ -21,6 +22,7 @@ from dubins_traffic.policies.rules.seeing import (
     one_is_ego,
     way_to_go,
 )
+from dubins_traffic.policies.rules.steering import HURRY
 from dubins_traffic.policies.rules.tables import Traffic
 from dubins_traffic.policies.rules.turn_arcs import PART, ReferencePath, on_lane, on_way
 from dubins_traffic.roads.lookup import lane_end, lane_start
@@ -116,8 +118,14 @@ def away_from(b: int, n: int, part: int, way: ReferencePath, near: int, traffic:
             if left >= 0.0:
                 offset = min(offset, left - half - clear)
             elif part == PART.THROUGH and dx * px + dy * py > -2.0 * vehicle.reach:
-                offset = left + half + clear
+                offset = min(left + half + clear, farthest_left(vehicle))
     if part != PART.THROUGH:
         return max(offset, EDGE - vehicle.middle)
     around = vehicle.tightest == 0.0 and is_in_bend(b, n, traffic)
-    return max(offset, farthest_right(way, state.x[b, n], state.y[b, n], around))
+    x, y = state.x[b, n], state.y[b, n]
+    most = farthest_right(way, x, y, around)
+    if around and way.side > 0.0:
+        # Where the road's edge comes nearer, who drives along it turns away in time.
+        _, _, _, px, py = on_way(way, x, y)
+        most = max(most, farthest_right(way, x + HURRY * px, y + HURRY * py, around))
+    return max(offset, most)

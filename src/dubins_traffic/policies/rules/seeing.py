@@ -220,7 +220,8 @@ def comes_past(way: ReferencePath, x: float, y: float, dx: float, dy: float, wid
 def leans_past(b: int, n: int, j: int, place: Beside, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether car `n` gets past car `j` in a disc, at a `place` (m, direction) beside its way, by leaning.
 
-    Two e-agents do so in bends and dead ends, where a tick is long.
+    Two e-agents do so in bends and dead ends, where a tick is long. Who is clear of the other already drives on where
+    that moves a little: it needs no more room than it keeps in a tick.
     """
     state, vehicle, left = traffic.state, traffic.drivers.vehicle[b], place.left
     if traffic.drivers.car[b, n].aside != 0.0 or traffic.labels.lane[b, j] >= 0:
@@ -229,9 +230,20 @@ def leans_past(b: int, n: int, j: int, place: Beside, way: ReferencePath, traffi
     if not (one_is_ego(j, n) or (bend and leans(vehicle))):
         return False
     kept = half_across(b, j, place.px, place.py, state, vehicle) + kept_beside(vehicle)
+    if is_clear_of(b, n, j, left, kept - SIDE, way, traffic):
+        kept -= SIDE
     if left < 0.0:
         return left + kept <= farthest_left(vehicle)
     return left - kept >= farthest_right(way, state.x[b, j], state.y[b, j], bend and vehicle.tightest == 0.0)
+
+
+@jit_inline
+def is_clear_of(b: int, n: int, j: int, left: float, kept: float, way: ReferencePath, traffic: Traffic) -> bool:
+    """Tell whether car `n` is near car `j`, which is `left` (m) of its way, and at least `kept` (m) beside it."""
+    state, far = traffic.state, leans_from(traffic.drivers.vehicle[b])
+    dx, dy = state.x[b, j] - state.x[b, n], state.y[b, j] - state.y[b, n]
+    _, _, own, _, _ = on_way(way, state.x[b, n], state.y[b, n])
+    return dx * dx + dy * dy <= far * far and abs(left - own) >= kept
 
 
 @jit_inline

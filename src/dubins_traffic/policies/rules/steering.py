@@ -145,9 +145,9 @@ def go_aside(b: int, n: int, motion: Motion, line: Line, way: ReferencePath, nea
 
 @jit_rare
 def goes_on(b: int, n: int, speed: float, outside: bool, way: ReferencePath, near: int, traffic: Traffic) -> bool:
-    """Tell whether an e-agent to which another car is as close as may be can drive straight past it, on or back."""
+    """Tell whether a car to which another one is as close as may be can drive straight past it, on or back."""
     vehicle = traffic.drivers.vehicle[b]
-    on = n != EGO and is_safe(b, n, speed, 0.0, near, -1, traffic, vehicle)
+    on = is_safe(b, n, speed, 0.0, near, -1, traffic, vehicle)
     return on and (not outside or stays_right(b, n, speed, 0.0, way, traffic))
 
 
