@@ -25,6 +25,7 @@ from dubins_traffic.competition.judging import FramesHash, Judged, judge
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.competition.templates import write_template
 from dubins_traffic.runs.single import run_trial
+from dubins_traffic.runs.sources import load_record
 from dubins_traffic.sandbox import boxed_controller
 
 COUNT = 1000
@@ -165,7 +166,7 @@ def processor_s(folder: Path, count: int = MEASURED) -> tuple[float, float]:
     for number in phase.numbers:
         instance = phase.instance(number, 16)
         run_trial(instance, seat, record=record, overwrite=True, sinks=(FramesHash(),), sketch=False)
-        gzip.compress(replay_of(record).encode(), 6)
+        gzip.compress(replay_of(load_record(record)).encode(), 6)
         if number == 0:
             began = time.process_time()
         else:

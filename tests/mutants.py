@@ -153,10 +153,10 @@ class ReturnsEarly(Mutant):
 
     def see(self, view: Seen) -> None:
         away, bearing = view.bearings()
-        beside = (bearing < -0.2) & (bearing > -2.9) & (away < 1.2) & view.has(FLAG.LEFT)[:, :1]
+        beside = (bearing < -0.8) & (bearing > -2.9) & (away < 1.2) & view.has(FLAG.LEFT)[:, :1]
         beside[:, EGO] = False
         view.seen[beside] = False
-        view.block.drivers.car["aside"][view.rows[view.has(FLAG.LEFT)[:, EGO]], EGO] = 0.0
+        view.block.drivers.car["aside"][view.rows[beside.any(axis=1)], EGO] = 0.0
 
 
 class StopsShort(Mutant):
