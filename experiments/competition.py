@@ -24,6 +24,7 @@ from dubins_traffic.competition.competition import Competition, Phase
 from dubins_traffic.competition.judging import FramesHash, Judged, judge
 from dubins_traffic.competition.submission import Submission, check_submission
 from dubins_traffic.competition.templates import write_template
+from dubins_traffic.protocols import End
 from dubins_traffic.runs.single import run_trial
 from dubins_traffic.runs.sources import load_record
 from dubins_traffic.sandbox import boxed_controller
@@ -157,15 +158,12 @@ def processor_s(folder: Path, count: int = MEASURED) -> tuple[float, float]:
     from dubins_traffic.service.worker import replay_of
 
     phase, own = demo(count + 1, folder)
-    seat, record, boxes, began = (
-        boxed_controller(str(own.path), phase.limits),
-        folder / "trial.mcap",
-        0.0,
-        0.0,
-    )
+    record, boxes, began = folder / "trial.mcap", 0.0, 0.0
     for number in phase.numbers:
         instance = phase.instance(number, 16)
-        run_trial(instance, seat, record=record, overwrite=True, sinks=(FramesHash(),), sketch=False)
+        seat = boxed_controller(str(own.path), phase.limits(instance))
+        result = run_trial(instance, seat, record=record, overwrite=True, sinks=(FramesHash(),), sketch=False)
+        assert result.ending.end is not End.CONTROLLER_FAULT, result.ending
         gzip.compress(replay_of(load_record(record)).encode(), 6)
         if number == 0:
             began = time.process_time()
