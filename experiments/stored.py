@@ -190,7 +190,6 @@ CLAIMS: Mapping[str, Claim] = {
 class Stored:
     """A result: the command that gave it, when, of which commit, on what, and its rows.
 
-    `stated` names the page that a result was taken from which had been run before results were stored, else it is "".
     `counts` is what its rows sum up, for an experiment that further runs add to.
     """
 
@@ -199,7 +198,6 @@ class Stored:
     commit: str
     machine: str
     rows: tuple[Row, ...]
-    stated: str = ""
     counts: tuple[dict[str, Any], ...] = ()
 
 
@@ -254,7 +252,7 @@ HEAD = """\
 This page is for whoever asks what the other pages rest on: each claim that takes many trials to show, the command that
 shows it, and the result that is stored. It is made of the files in `experiments/results` by `python -m experiments
 --page`; `python -m experiments --store NAME` runs an experiment, stores its result and writes the page anew. A result
-says when it was measured, and of which commit; one that a page had stated before results were stored names that page.
+says when it was measured, and of which commit.
 [Benchmarks](../benchmarks/README.md) are about speed alone.
 """
 
@@ -266,9 +264,8 @@ def _section(name: str, claim: Claim) -> str:
     if found is None:
         lines += ["", f"No result is stored. `python -m experiments --store {name}` takes {claim.takes}."]
         return "\n".join([*lines, ""])
-    stated = f"; stated in `{found.stated}`" if found.stated else ""
     where = f" {found.machine}" if found.machine else ""
-    lines += ["", f"`{found.command}`, {found.date}, commit {found.commit}{stated}.{where}", ""]
+    lines += ["", f"`{found.command}`, {found.date}, commit {found.commit}.{where}", ""]
     lines += ["| what | measured | bar |", "|---|---|---|"]
     lines += [f"| {row.name} | {row.figure} | {_bar(row)} |" for row in found.rows]
     return "\n".join([*lines, ""])
