@@ -85,7 +85,8 @@ def move(
         speed, yaw_rate = keep_right(b, n, speed, yaw_rate, outside, way, traffic)
     safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
     # A car that turns in place to where it may not drive would turn back in the next tick, and so on for ever.
-    off_line = offset < 0.0 or abs(left) > SLIGHT
+    leans = offset < 0.0 or (offset > 0.0 and not (passes or outside))
+    off_line = leans or abs(left) > SLIGHT
     if safe and speed == 0.0 and vehicle.tightest == 0.0 and (passes or steep == ABRUPT or off_line):
         safe = leads_on(b, n, Line(left - offset, px, py, allowed), steep, near, trusted, traffic)
     returns = outside and offset == 0.0 and np.int64(labels.bits[b, n]) & FLAG.LEFT != 0
@@ -99,10 +100,11 @@ def move(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
         )
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
-    elif not safe and (passes or steep == ABRUPT or offset < 0.0):
-        # Who leans past a body and is farther right than he would be drives straight on, and not up to it.
-        back = -1.0 if passes or offset >= 0.0 else 0.0
-        across, narrow = 1.0 if left > offset else back, within_lane(drivers.car[b, n].aside, vehicle)
+    elif not safe and (passes or steep == ABRUPT or leans):
+        across, narrow = 1.0 if left > offset else -1.0, within_lane(drivers.car[b, n].aside, vehicle)
+        if leans and not passes and across * offset > 0.0:
+            # Who leans past a body and is farther from it than he would be drives straight on, and not up to it.
+            across = 0.0
         speed, yaw_rate = steer(
             c, s, across, px, py, bend, allowed, NIMBLE if narrow else SQUARE, aligned, limit, vehicle.tightest,
             vehicle.period,
