@@ -270,15 +270,16 @@ def farthest_right(way: ReferencePath, x: float, y: float, around: bool) -> floa
     """Return the offset from its way, negative, at which a car beside a point, `x` (m), `y` (m), is at the road's edge.
 
     Outside a turn to the left the road reaches farther, if `around` (bool): in bends, for who turns in place. The inner
-    corner of one to the right is nearer than the edge.
+    corner of one to the right is nearer than the edge, up to where it is passed.
     """
     most = EDGE - way.middle
     part, _, _, px, py = on_way(way, x, y)
     if part != PART.THROUGH or (way.side > 0.0 and not around):
         return most
     if way.side < 0.0:
-        half = sqrt(0.5 + 0.5 * (way.ux * way.tx + way.uy * way.ty))
-        inner = (way.radius - way.middle) / half - way.radius + EDGE
+        # Beyond the corner the edge is along the lane out, at an angle of this cosine to the way.
+        cosine = max(sqrt(0.5 + 0.5 * (way.ux * way.tx + way.uy * way.ty)), px * way.ux + py * way.uy)
+        inner = (way.radius - way.middle) / cosine - way.radius + EDGE
         return max(most, inner) if way.radius > way.middle else most
     # The road's end is a disc about the intersection: from the centre of the arc it reaches so far in this direction.
     rx, ry = way.x - way.cx, way.y - way.cy
