@@ -65,14 +65,14 @@ def test_who_keeps_the_law_leaves_in_time_among_many() -> None:
     Or behind one that stood at the outer edge of a bend, or came a little over the line beside its exit; or it turned
     toward its way, which an ego barred, and there to its line and back for ever; or it came a hair into a bend and kept
     a gap to who stood there, past whom it could lean, or waited for an ego that it could pass outside; or one beside it
-    shifted by 3 mm, and it waited.
+    shifted by 3 mm, or beyond the corner, and it waited; or it did not go aside where its way was too near.
     """
     found = list(outcomes(cases_in(WIDE), Free))
     assert [own.file.stem for own in found] == [
         "drives_on_in_a_bend_beside_an_ego", "drives_on_where_an_ego_bars_its_line", "leaves_a_crossing_late",
         "leaves_beside_who_comes_over_the_line", "leaves_beside_who_stands_at_the_edge", "leaves_beside_who_turns",
-        "passes_outside_in_a_bend", "turns_to_its_line_and_back", "waits_at_the_edge_of_a_disc",
-        "waits_beside_who_shifts",
+        "leaves_left_of_who_turns", "leaves_past_the_corner_beside_who_shifts", "passes_outside_in_a_bend",
+        "turns_to_its_line_and_back", "waits_at_the_edge_of_a_disc", "waits_beside_who_shifts",
     ]  # fmt: skip
     assert [own.file.name for own in found if not own.passed] == []
 
