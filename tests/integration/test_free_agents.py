@@ -35,6 +35,8 @@ OPEN: dict[str, set[int]] = {
 }
 """Trials with a breach, by who is first to break a rule: a free car, by E4 in a bend, where it has turned back since it
 found no exit."""
+FELL = (1225,)
+"""Trials beyond the first ones in which a lawful car once broke a rule: it drove on, 1 mm too far over the line."""
 NETWORKS: tuple[dict[str, Any], ...] = (
     {"grid": {"rows": 2, "columns": 3, "length": 4.0}},
     {"random": {"intersections": 6, "segments": 7, "bent": 0.6}},
@@ -99,7 +101,7 @@ def first_breach(score: Score) -> str | None:
 def broken() -> dict[int, str]:
     """Run all trials, many at once; return those with a breach, and who was first."""
     found: dict[int, str] = {}
-    for some in grouped([instance(number) for number in range(TRIALS)]):
+    for some in grouped([instance(number) for number in sorted({*range(TRIALS), *FELL})]):
         group = Group(some, keeps_rules=True)
         group.finish()
         for outcome in group.outcomes(range(len(some)), "rules"):

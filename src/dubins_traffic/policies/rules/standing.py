@@ -40,6 +40,14 @@ def stays_right(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePat
     return surely_stands(b, n, here, way, traffic)
 
 
+@jit_rare
+def becomes_left(b: int, n: int, speed: float, yaw_rate: float, way: ReferencePath, traffic: Traffic) -> bool:
+    """Tell whether a command brings the body of a car so far over the centre line that the car is left."""
+    state, vehicle = traffic.state, traffic.drivers.vehicle[b]
+    x, y, c, s = advance(state.x[b, n], state.y[b, n], state.c[b, n], state.s[b, n], speed, yaw_rate, vehicle.period)
+    return aside(way, x, y) + half_extent(way.tx, way.ty, c, s, vehicle) > vehicle.middle + vehicle.over
+
+
 @jit
 def surely_stands(b: int, n: int, here: float, way: ReferencePath, traffic: Traffic) -> bool:
     """Tell whether a car in the way of car n, `here` (m) along its lane in the next frame, will stand then too.

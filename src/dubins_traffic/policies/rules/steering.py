@@ -14,7 +14,7 @@ from dubins_traffic.policies.rules.narrow import within_lane
 from dubins_traffic.policies.rules.passing import WARY, along, aside
 from dubins_traffic.policies.rules.returning import NARROWLY, last_return
 from dubins_traffic.policies.rules.seeing import ABRUPT, ASTRAY
-from dubins_traffic.policies.rules.standing import may_drive_on, stays_right
+from dubins_traffic.policies.rules.standing import becomes_left, may_drive_on, stays_right
 from dubins_traffic.policies.rules.tables import KIND, VIOLATION, Traffic, Vehicle
 from dubins_traffic.policies.rules.turn_arcs import ReferencePath
 from dubins_traffic.policies.safety import GUARD, may_hit, may_meet, travel_of
@@ -100,6 +100,9 @@ def move(
             c, s, 0.0, px, py, bend, allowed, steep, aligned, limit, vehicle.tightest, vehicle.period
         )
         safe = is_safe(b, n, speed, yaw_rate, near, trusted, traffic, vehicle)
+        if outside and not (passes or returns):
+            # Close to the centre line who leans to the left turns straight first, and drives on then.
+            safe = safe and not becomes_left(b, n, speed, yaw_rate, way, traffic)
     elif not safe and (passes or steep == ABRUPT or leans):
         across, narrow = 1.0 if left > offset else -1.0, within_lane(drivers.car[b, n].aside, vehicle)
         if leans and not passes and across * offset > 0.0:
