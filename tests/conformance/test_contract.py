@@ -15,13 +15,15 @@ from concurrent.futures import ProcessPoolExecutor
 from functools import partial
 
 import pytest
+from experiments.conformance import SECONDS as LONG
+from experiments.conformance import TRIALS
 
 from tests.contract_blocking import BLOCKING
 from tests.contract_provoking import PROVOKING
 from tests.contract_scenes import SCENES, Came, trial
 
 FULL = os.environ.get("DUBINS_TRAFFIC_CONTRACT") == "full"
-NUMBERS = tuple(range(2240 // len(SCENES) + 1)) if FULL else tuple(range(4))
+NUMBERS = tuple(range(TRIALS // len(SCENES) + 1)) if FULL else tuple(range(4))
 FELL = {
     "disc_edge_out": (7, 8),
     "before_obstacle": (4, 9, 14, 34, 44),
@@ -35,7 +37,7 @@ FELL = {
     "ego_whims": (10, 14, 16, 22, 27, 28, 34, 40, 46, 50, 52, 58),
 }
 """Trials beyond the first ones in which the bar once did not hold."""
-SECONDS = 300.0 if FULL else None
+SECONDS = LONG if FULL else None
 
 
 def _came(name: str) -> list[Came]:
