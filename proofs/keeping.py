@@ -81,7 +81,7 @@ class Drive:
             "is_safe": self.is_safe, "is_safe_from": _either_way, "steer": _pair, "keep_right": _pair,
             "heading": _pair, "slowed": _any_real, "room_to_return": _any_real, "along": _any_real,
             "aside": _any_real, "travel_of": _any_real, "last_return": _any_real, "backs_off": _any_real,
-            "within_lane": _either_way, "stays_right": _either_way,
+            "within_lane": _either_way, "stays_right": _either_way, "becomes_left": _either_way,
         }  # fmt: skip
 
 

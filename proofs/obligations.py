@@ -142,6 +142,7 @@ FLAWS: Final = (
     Flaw("driven", steering, "    if not safe:\n        speed = 0", "    if not safe and near > 1:\n        speed = 0"),
     Flaw("driven", steering, "return on and (not outside", "return (not outside"),
     Flaw("driven", steering, "return retreat if", "return Motion(retreat.speed, 0.0, True) if"),
+    Flaw("driven", steering, "safe = safe and not becomes_left", "safe = not becomes_left"),
     Flaw("called", breaches, "FIRST_AND_CLEAR == FIRST_AND_CLEAR", "FIRST_AND_CLEAR != 0"),
 )  # fmt: skip
 
