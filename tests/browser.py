@@ -91,5 +91,8 @@ def widen(browser: webdriver.Chrome, width: int, height: int = 800) -> None:
 
 
 def sideways(browser: webdriver.Chrome) -> int:
-    """Return by how many pixels the page is wider than its window."""
-    return browser.execute_script("return document.documentElement.scrollWidth - document.documentElement.clientWidth")
+    """Return by how many pixels the page is wider than its window, once it has been drawn with its present size."""
+    return browser.execute_async_script(
+        "const done = arguments[0], root = document.documentElement;"
+        "requestAnimationFrame(() => requestAnimationFrame(() => done(root.scrollWidth - root.clientWidth)))"
+    )

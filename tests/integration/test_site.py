@@ -196,8 +196,7 @@ def test_a_page_asks_for_files_beside_it_alone(name: str, site: Path, browser: w
     for kind in ("performance", "browser"):
         browser.get_log(kind)  # of pages before
     browser.get((site / f"{name}.html").as_uri())
-    width = "return document.documentElement.scrollWidth - document.documentElement.clientWidth"
-    assert browser.execute_script(width) <= 0
+    assert sideways(browser) <= 0
     events = [json.loads(line["message"])["message"] for line in browser.get_log("performance")]
     sent = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
     asked = [one["request"]["url"] for one in sent if not one["request"]["url"].startswith(("data:", "chrome:"))]

@@ -22,7 +22,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.record import reader
 from dubins_traffic.runs.single import Result
-from tests.browser import browsing, faults
+from tests.browser import browsing, faults, sideways
 from tests.driving import Eyes, KeyDriver
 from tests.integration.test_watch import Program, running
 from tests.pages import ask, element
@@ -96,8 +96,7 @@ def check_fit(browser: webdriver.Chrome) -> None:
             browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
             until(browser, f"document.documentElement.dataset.theme === '{theme}'")
             assert faults(browser) == [], (width, theme)
-            wide = "return document.documentElement.scrollWidth <= document.documentElement.clientWidth"
-            assert browser.execute_script(wide), (width, theme)
+            assert sideways(browser) <= 0, (width, theme)
     browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
 
