@@ -13,7 +13,7 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.support.wait import WebDriverWait
 
-from tests.browser import WAIT_S, browsing, dark, faults, fill, login
+from tests.browser import WAIT_S, browsing, dark, faults, fill, login, sideways
 from tests.services import CIRCLING, CRASHING, PASSWORD, STANDING, Service, competition_text, season
 
 pytestmark = pytest.mark.tools("browser")
@@ -130,7 +130,7 @@ def test_every_page_is_fit_for_all(browser: webdriver.Chrome, service: Service) 
                 dark(browser, night)
                 browser.get(service.url + path)
                 wrong = faults(browser)
-                if browser.execute_script("return document.documentElement.scrollWidth > innerWidth"):
+                if sideways(browser) > 0:
                     wrong.append(f"wider than {size[0]} pixels")
                 if wrong:
                     found[f"{path} {name} {size} {'dark' if night else 'light'}"] = wrong

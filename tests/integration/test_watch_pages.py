@@ -22,7 +22,7 @@ from dubins_traffic.problem.configuration import load_config
 from dubins_traffic.problem.draw import draw
 from dubins_traffic.record import reader
 from dubins_traffic.runs.single import Result
-from tests.browser import browsing, faults, sideways
+from tests.browser import browsing, dark, faults, sideways
 from tests.driving import Eyes, KeyDriver
 from tests.integration.test_watch import Program, running
 from tests.pages import ask, element
@@ -92,8 +92,7 @@ def check_fit(browser: webdriver.Chrome) -> None:
         size = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
         for theme in ("light", "dark"):
-            features = [{"name": "prefers-color-scheme", "value": theme}]
-            browser.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": features})
+            dark(browser, theme == "dark")
             until(browser, f"document.documentElement.dataset.theme === '{theme}'")
             assert faults(browser) == [], (width, theme)
             assert sideways(browser) <= 0, (width, theme)
